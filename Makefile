@@ -1,0 +1,49 @@
+# `make run` and `make test` do everything, set-up included: a virtual environment, the package and ngspice.
+# Choose the interpreter with PYTHON=/path/to/python3.12 and the environment's folder with VENV=/some/folder.
+
+VENV ?= .venv
+DESIGN ?= examples/plain_weave.toml
+OUT ?= results/$(basename $(notdir $(DESIGN)))
+PYTEST_ARGS ?= -n auto
+
+PY := $(VENV)/bin/python
+export VENV PYTHON
+
+.PHONY: run test lint style types docs clean ngspice help
+.DEFAULT_GOAL := help
+
+help: ## list the targets
+	@grep -E '^[a-z]+:.*##' Makefile | sed -E 's/^([a-z]+):.*## /make \1\t/' | expand -t 14
+
+run: $(VENV)/.ready ngspice ## compute DESIGN (the plain weave of the paper) into OUT
+	$(PY) -m circuittex run $(DESIGN) --out $(OUT)
+
+test: $(VENV)/.ready ngspice ## run the whole test suite
+	$(PY) -m pytest $(PYTEST_ARGS)
+
+lint: style types ## style, format and types
+
+style: $(VENV)/.ready
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+
+types: $(VENV)/.ready
+	$(PY) -m mypy
+
+docs: $(VENV)/.ready-docs ## build the documentation into docs/_build, warnings are errors
+	$(PY) -m sphinx -W --keep-going -E -q -b html docs docs/_build
+	@echo "documentation: docs/_build/index.html"
+
+ngspice: ## install ngspice where it is missing
+	@.ci/setup ngspice
+
+clean: ## remove the environment, caches and built documentation, but no results
+	rm -rf $(VENV) build dist *.egg-info docs/_build .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find circuittex tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# The stamps make repeated calls quick: the environment is renewed when the dependencies or its recipe change.
+$(VENV)/.ready: pyproject.toml .ci/setup
+	@.ci/setup environment
+
+$(VENV)/.ready-docs: $(VENV)/.ready
+	@.ci/setup docs

@@ -1,0 +1,72 @@
+"""circuittex: the electrical behaviour of electronic textiles, from their fibrils up to SPICE netlists.
+
+The public names below are loaded when they are first used, so that ``import circuittex`` costs next to nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "design": ("Design", "design_hash", "load_design", "parse_design", "plain_weave", "starter"),
+    "geometry.weave": ("build_mesh",),
+    "mech.configuration": ("initial_configuration",),
+    "contact.state": ("ContactState",),
+    "contact.extract": ("contact_state",),
+    "contact.merge": ("simplify",),
+    "fields": ("solve_fields",),
+    "circuit": ("Circuit", "build_circuit", "reduced_circuit", "yarn_end_terminals"),
+    "nodal": ("solve_nodal",),
+    "netlist": ("Header", "deck", "subcircuit", "to_pyspice"),
+    "fit": ("fit_network",),
+    "study": ("run_study",),
+    "results": ("Record", "Study"),
+    "store": ("load_study",),
+    "errors": ("CircuittexError", "ConvergenceError", "DesignError"),
+}
+_HOME = {name: f"circuittex.{module}" for module, names in _HOMES.items() for name in names}
+
+__all__ = ["__version__", *_HOME]
+
+if TYPE_CHECKING:
+    from circuittex.circuit import Circuit as Circuit
+    from circuittex.circuit import build_circuit as build_circuit
+    from circuittex.circuit import reduced_circuit as reduced_circuit
+    from circuittex.circuit import yarn_end_terminals as yarn_end_terminals
+    from circuittex.contact.extract import contact_state as contact_state
+    from circuittex.contact.merge import simplify as simplify
+    from circuittex.contact.state import ContactState as ContactState
+    from circuittex.design import Design as Design
+    from circuittex.design import design_hash as design_hash
+    from circuittex.design import load_design as load_design
+    from circuittex.design import parse_design as parse_design
+    from circuittex.design import plain_weave as plain_weave
+    from circuittex.design import starter as starter
+    from circuittex.errors import CircuittexError as CircuittexError
+    from circuittex.errors import ConvergenceError as ConvergenceError
+    from circuittex.errors import DesignError as DesignError
+    from circuittex.fields import solve_fields as solve_fields
+    from circuittex.fit import fit_network as fit_network
+    from circuittex.geometry.weave import build_mesh as build_mesh
+    from circuittex.mech.configuration import initial_configuration as initial_configuration
+    from circuittex.netlist import Header as Header
+    from circuittex.netlist import deck as deck
+    from circuittex.netlist import subcircuit as subcircuit
+    from circuittex.netlist import to_pyspice as to_pyspice
+    from circuittex.nodal import solve_nodal as solve_nodal
+    from circuittex.results import Record as Record
+    from circuittex.results import Study as Study
+    from circuittex.store import load_study as load_study
+    from circuittex.study import run_study as run_study
+else:
+
+    def __getattr__(name: str) -> Any:
+        if name not in _HOME:
+            raise AttributeError(f"module 'circuittex' has no attribute {name!r}")
+        value = getattr(import_module(_HOME[name]), name)
+        globals()[name] = value  # found directly from now on
+        return value
+
+    def __dir__() -> list[str]:
+        return sorted({*globals(), *__all__})

@@ -1,0 +1,247 @@
+"""The command line: new, run, netlist, verify, report."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+from circuittex.errors import CircuittexError, DesignError, StoreError
+from circuittex.options import build_parser
+
+if TYPE_CHECKING:
+    from circuittex.contact.merge import Simplified
+    from circuittex.design import Design, Probe
+    from circuittex.results import Record, Study
+
+RESULTS = "results.h5"
+"""Name of the HDF5 file in a results folder."""
+
+BAD_INPUT, DISAGREE, INTERRUPTED, BROKEN_PIPE = 2, 1, 130, 141
+"""Exit codes besides 0; the last two are what shells report for SIGINT and SIGPIPE."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    >>> main(["run", "no-such-file.toml", "--out", "somewhere"])
+    2
+    """
+    options = build_parser().parse_args(arguments)
+    try:
+        code = COMMANDS[options.command](options)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # The reader of our output has gone, as in `circuittex new | head`: nobody is left to tell.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+    except (CircuittexError, OSError) as error:
+        print("circuittex: error:", " ".join(str(error).split()), file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print(f"\ncircuittex: interrupted; {_kept(options)}", file=sys.stderr)
+        return INTERRUPTED
+    return code
+
+
+def _new(options: argparse.Namespace) -> int:
+    from circuittex.design import starter
+
+    print(starter(), end="")
+    return 0
+
+
+def _run(options: argparse.Namespace) -> int:
+    from circuittex.design import load_design
+
+    design = load_design(options.design)
+    _prepare(options.out)
+    with Progress(sys.stderr, show=not options.quiet) as progress:
+        progress("loading the solvers")
+        from circuittex.study import run_study
+        from circuittex.summary import table
+
+        study = run_study(design, options.out, progress=progress)
+    if not options.quiet:
+        print(table(study))
+        print(f"\nreport: {options.out / 'report.html'}")
+    return 0
+
+
+def _netlist(options: argparse.Namespace) -> int:
+    study = _load(options.results)
+    (record,) = _select(study, options.state)
+    text, resistors = _netlist_text(study, record, options)
+    if options.out is None:
+        print(text, end="")
+    else:
+        options.out.write_text(text, encoding="ascii")
+    from circuittex.ngspice import estimated_seconds, feasible
+
+    if not feasible(resistors):
+        seconds = estimated_seconds(resistors)
+        print(f"circuittex: note: {resistors} resistors may take ngspice {seconds:.0f} s or more", file=sys.stderr)
+    return 0
+
+
+def _netlist_text(study: Study, record: Record, options: argparse.Namespace) -> tuple[str, int]:
+    """The netlist that the options ask for, and its number of resistors."""
+    from circuittex.circuit import build_circuit, reduced_circuit, yarn_end_terminals
+    from circuittex.netlist import Header, deck, subcircuit
+
+    design = study.design
+    header = partial(Header, design=design.name, design_hash=study.design_hash, state=record.name)
+    if options.kind == "reduced":
+        circuit = reduced_circuit((len(design.weave.warp), len(design.weave.weft)), record.fit.Ry, record.fit.Rc)
+        return subcircuit(circuit, f"{record.name} reduced", header("reduced network")), circuit.n_resistors
+    merge_length = design.numerics.merge_length if options.resolution == "merged" else 0.0
+    simple = _simplified(study, record, merge_length)
+    notes = (f"contact points added to others within {merge_length:g} mm: {simple.merged_contacts}",)
+    if options.kind == "subckt":
+        circuit = build_circuit(
+            simple.contacts, yarn_end_terminals(study.mesh), dropped_contacts=simple.dropped_contacts
+        )
+        return subcircuit(circuit, record.name, header("detailed network", notes=notes)), circuit.n_resistors
+    probe = _probe(design, options.probe)
+    terminals = [terminal for terminal in design.terminals if terminal.name in (probe.source, probe.sink)]
+    circuit = build_circuit(simple.contacts, terminals, dropped_contacts=simple.dropped_contacts)
+    drive = {probe.source: probe.voltage, probe.sink: 0.0}
+    return deck(circuit, drive, header(f"detailed network, probe {probe.name}", notes=notes)), circuit.n_resistors
+
+
+def _simplified(study: Study, record: Record, merge_length: float) -> Simplified:
+    """The record's contacts as the design wants them in netlists, but for the merge length."""
+    from circuittex.contact.merge import simplify
+
+    numerics = study.design.numerics
+    return simplify(
+        record.contacts,
+        merge_length=merge_length,
+        snap_length=numerics.snap_length,
+        drop_fraction=numerics.drop_fraction,
+    )
+
+
+def _probe(design: Design, name: str | None) -> Probe:
+    """The probe called `name`, or the first one."""
+    for probe in design.probes:
+        if name in (None, probe.name):
+            return probe
+    raise DesignError("--probe", name, f"probes: {', '.join(probe.name for probe in design.probes) or 'none'}")
+
+
+def _verify(options: argparse.Namespace) -> int:
+    study = _load(options.results)
+    records = _select(study, options.state)
+    from circuittex.verify import AGREEMENT, verify
+
+    design = study.design
+    agree = True
+    print(f"{'state':<20} {'V per V':>8} {'current':>8} {'merging':>8} {'mesh':>8}  routes")
+    for record in records:
+        simple = _simplified(study, record, design.numerics.merge_length)
+        check = verify(record.contacts, simple.contacts, design.terminals, design.probes)
+        differences = check.max_voltage_difference, check.max_current_difference
+        agree &= check.ngspice_checked and all(difference <= AGREEMENT for difference in differences)
+        numbers = [*differences, check.merge_error, check.field_difference]
+        shown = " ".join(f"{number:8.1e}" for number in numbers)
+        print(f"{record.name:<20} {shown}  {', '.join(check.routes)} {check.note}".rstrip(), flush=True)
+    print(f"all routes agree to {AGREEMENT:.0e}" if agree else "NOT confirmed: see the notes above")
+    return 0 if agree else DISAGREE
+
+
+def _report(options: argparse.Namespace) -> int:
+    study = _load(options.results)
+    folder = options.results if options.results.is_dir() else options.results.parent
+    _prepare(folder)
+    from circuittex.report import write_report
+    from circuittex.summary import write_summary
+
+    write_summary(folder / "summary.json", study)
+    print(write_report(folder, study))
+    return 0
+
+
+COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
+    "new": _new,
+    "run": _run,
+    "netlist": _netlist,
+    "verify": _verify,
+    "report": _report,
+}
+
+
+class Progress:
+    """Shows what is being done: one updating line on a terminal, plain lines elsewhere."""
+
+    def __init__(self, stream: TextIO, *, show: bool = True) -> None:
+        self._stream, self._show = stream, show
+        self._updating = stream.isatty()
+
+    def __call__(self, text: str) -> None:
+        """Show `text`, which is one line."""
+        if not self._show:
+            return
+        if self._updating:
+            width = shutil.get_terminal_size().columns - 1
+            self._stream.write(f"\r\x1b[2K{text[:width]}")
+        else:
+            self._stream.write(f"{text}\n")
+        self._stream.flush()
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._show and self._updating:
+            self._stream.write("\r\x1b[2K")
+            self._stream.flush()
+
+
+def _prepare(folder: Path) -> None:
+    """Make the folder of the results and make sure that files can be written there, before any long work."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        reason = "a file is in the way" if isinstance(error, FileExistsError | NotADirectoryError) else error.strerror
+        raise DesignError(
+            "results folder", str(folder), f"it must be a folder that can be written to ({reason})"
+        ) from error
+
+
+def _load(path: Path) -> Study:
+    """The study in a results folder, or in an HDF5 file given by its own name."""
+    from circuittex.store import load_study
+
+    return load_study(path / RESULTS if path.is_dir() else path)
+
+
+def _select(study: Study, name: str | None) -> tuple[Record, ...]:
+    """The record called `name`, or all of them."""
+    found = tuple(record for record in study.records if name in (None, record.name))
+    if not found:
+        names = ", ".join(record.name for record in study.records) or "none"
+        raise DesignError("--state", name, f"recorded states: {names}")
+    return found
+
+
+def _kept(options: argparse.Namespace) -> str:
+    """What an interrupted command leaves behind, in words."""
+    if options.command != "run":
+        return "results that were there before are unchanged"
+    try:
+        count = len(_load(options.out).records)
+    except StoreError:
+        count = 0
+    if count == 0:
+        return "no state was finished"
+    states = "1 finished state is" if count == 1 else f"{count} finished states are"
+    return f"{states} kept in {options.out / RESULTS}"

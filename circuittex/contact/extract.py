@@ -1,0 +1,64 @@
+"""From a configuration to its frozen `ContactState`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from circuittex.contact.law import effective_modulus, effective_radius, hertz_width
+from circuittex.contact.penalty import PenaltyContact
+from circuittex.contact.state import ContactState
+from circuittex.design import ContactLaw
+from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.mech.configuration import Configuration
+from circuittex.mech.space import BeamSpace, beam_space
+
+
+def contact_state(
+    mesh: FibrilMesh, configuration: Configuration, law: ContactLaw, *, per_element: int = 4, conduction: str = "reference"
+) -> ContactState:
+    """The contact points of a configuration with their loads, Hertz widths and conductances.
+
+    p = P* o [28], a = sqrt(4 R* p / (pi E*)) [29], G = sigma_c a w [31] (0 where either fibril insulates),
+    heat conductance h_c a w [30]. `per_element` contact points an element; `conduction` is 'reference' or
+    'current' (`axial_factor`).
+    """
+    space = beam_space(mesh)
+    term = PenaltyContact(mesh, space.slot, penalty=law.penalty, per_element=per_element)
+    touching, table = term.touching(space.vector(configuration)), term.table
+    a, b = table.fibril[touching.interval_a], touching.fibril_b
+    spacing = mesh.length / (np.diff(mesh.first_node) - 1)
+    load = law.penalty * touching.overlap
+    e, nu = mesh.youngs_modulus, mesh.poisson_ratio
+    radius = effective_radius(mesh.radius[a], mesh.radius[b])
+    width = hertz_width(load, radius, effective_modulus(e[a], nu[a], e[b], nu[b]))
+    weight = term.weight[a]
+    sigma = mesh.electrical_conductivity
+    conducts = (sigma[a] > 0) & (sigma[b] > 0)
+    return ContactState(
+        mesh=mesh,
+        fibril_a=a,
+        fibril_b=b,
+        xi_a=(touching.interval_a - table.first_interval[a] + touching.t_a) * spacing[a],
+        xi_b=touching.position_b * spacing[b],
+        gap=-touching.overlap,
+        line_load=load,
+        width=width,
+        weight=weight,
+        conductance=np.where(conducts, law.conductivity * width * weight, 0.0),
+        heat_conductance=law.heat_transfer * width * weight,
+        axial_factor=axial_factor(space, configuration) if conduction == "current" else np.ones(len(mesh.elements)),
+    )
+
+
+def axial_factor(space: BeamSpace, configuration: Configuration) -> Floats:
+    """(M,) conduction along the axis of a material that keeps its conductivity in the current frame, over sigma A.
+
+    The conductance per reference length is sigma A_now / stretch with A_now = A |(g1 x g2).e| and
+    stretch = |r'|; an element's is the harmonic mean over its line points, since they lie in series.
+    """
+    x = space.vector(configuration).reshape(-1, 3, 3)[space.element_slots]
+    slope = np.einsum("eqa,eac->eqc", space.slope, x[:, :, 0])
+    g1, g2 = (np.einsum("qa,eac->eqc", space.shape, x[:, :, k]) for k in (1, 2))
+    stretch = np.sqrt((slope**2).sum(axis=2))
+    area = np.abs((np.cross(g1, g2) * slope).sum(axis=2)) / stretch
+    return np.asarray(1 / (stretch / area).mean(axis=1))

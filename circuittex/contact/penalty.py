@@ -1,0 +1,180 @@
+"""Penalty contact between fibrils as a force term [21, 24-28, 35]."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from circuittex.contact.closest import find_contacts
+from circuittex.contact.curve import BASIS, CurveTable, bezier, curve_table
+from circuittex.contact.kernels import add_contacts
+from circuittex.contact.search import CONTROL_MOTION, Candidates, coupled_nodes, find_candidates
+from circuittex.frozen import frozen
+from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
+from circuittex.mech.pattern import Pattern
+
+CHUNKS = 16
+"""Candidates are searched in this many pieces, whatever the number of threads."""
+
+
+@frozen
+class Touching:
+    """The C active contact points of one configuration, in a fixed order."""
+
+    interval_a: Ints
+    """(C,) interval that carries the contact point."""
+    t_a: Floats
+    """(C,) its local coordinate in [0, 1]."""
+    fibril_b: Ints
+    """(C,) the other fibril."""
+    position_b: Floats
+    """(C,) closest position on it, in nodes."""
+    overlap: Floats
+    """(C,) R + R' - |d| > 0, mm [26]."""
+
+
+def contact_points(mesh: FibrilMesh, per_element: int) -> Floats:
+    """(order, T) local coordinates of equally spaced contact points in each interval of an element [4.4].
+
+    Rows are padded with -1 where an interval has fewer points than another.
+    """
+    at = (np.arange(per_element) + 0.5) / per_element * mesh.order
+    interval = np.minimum(at.astype(int), mesh.order - 1)
+    rows = [at[interval == k] - k for k in range(mesh.order)]
+    table = np.full((mesh.order, max(map(len, rows))), -1.0)
+    for k, row in enumerate(rows):
+        table[k, : len(row)] = row
+    return table
+
+
+class PenaltyContact:
+    """Energy sum over contact points of 1/2 P* w o^2; both fibrils of a pair carry points, with half weight.
+
+    `penalty` is P* in N/mm2, `per_element` the number of contact points of an element, `skin` (mm) how far
+    candidates reach beyond touch so that they last several iterations.
+    """
+
+    def __init__(
+        self, mesh: FibrilMesh, slot: Ints, *, penalty: float, per_element: int, skin: float = 0.05
+    ) -> None:
+        self.mesh, self.slot, self.penalty, self.skin = mesh, slot, penalty, skin
+        self.table: CurveTable = curve_table(mesh)
+        self.points = contact_points(mesh, per_element)
+        size = mesh.length / np.diff(mesh.first_element) / per_element
+        self.weight = size / 2  # half: the pair is integrated from both sides
+        self._candidates: Candidates | None = None
+        self._built_at = np.empty((0, 3))
+        self._last: tuple[Floats, Touching] | None = None
+
+    def positions(self, q: Floats) -> Floats:
+        """(N, 3) centre-line nodes in mesh order."""
+        return np.ascontiguousarray(q.reshape(-1, 9)[self.slot, :3])
+
+    def prepare(self, q: Floats) -> bool:
+        """Renew the candidates once a Bézier point may have moved by half the skin."""
+        r = self.positions(q)
+        if self._candidates is not None:
+            moved = np.sqrt(((r - self._built_at) ** 2).sum(axis=1).max())
+            if CONTROL_MOTION * moved <= self.skin / 2:
+                return False
+        self._candidates = find_candidates(self.table, r, self.mesh.radius, self.skin)
+        self._built_at = r
+        self._last = None
+        return True
+
+    def pairs(self) -> tuple[Ints, Ints]:
+        """Node pairs that the present candidates can couple, positions only."""
+        assert self._candidates is not None, "prepare comes first"
+        return np.empty((0, 2), dtype=np.int64), self.slot[coupled_nodes(self.table, self._candidates)]
+
+    def touching(self, q: Floats) -> Touching:
+        """All contact points that overlap at q; candidates are renewed for it if q lies outside their reach."""
+        if self._last is not None and np.array_equal(self._last[0], q):
+            return self._last[1]
+        r = self.positions(q)
+        candidates = self._candidates
+        if candidates is None or CONTROL_MOTION * np.sqrt(((r - self._built_at) ** 2).sum(axis=1).max()) > self.skin / 2:
+            candidates = find_candidates(self.table, r, self.mesh.radius, 0.0)
+        found = _search(self.mesh, self.table, self.points, candidates, r)
+        self._last = q.copy(), found
+        return found
+
+    def energy(self, q: Floats) -> float:
+        """Contact energy, N mm."""
+        found = self.touching(q)
+        weight = self.weight[self.table.fibril[found.interval_a]]
+        return float(0.5 * self.penalty * np.sum(weight * found.overlap**2))
+
+    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats) -> float:
+        """Add gradient and tangent in place; return the energy."""
+        found, table = self.touching(q), self.table
+        last = table.first_interval[found.fibril_b + 1] - table.first_interval[found.fibril_b]
+        k = np.minimum(found.position_b.astype(np.int64), last - 1)
+        b = table.first_interval[found.fibril_b] + k
+        weight = self.weight[table.fibril[found.interval_a]]
+        add_contacts(
+            self.positions(q),
+            self.slot,
+            BASIS,
+            table.window[found.interval_a],
+            table.kind[found.interval_a],
+            found.t_a,
+            table.window[b],
+            table.kind[b],
+            found.position_b - k,
+            (found.position_b <= 0) | (found.position_b >= last),
+            found.overlap,
+            self.penalty * weight,
+            pattern.indptr,
+            pattern.neighbour_start,
+            pattern.neighbour,
+            pattern.point_offset,
+            gradient,
+            data,
+        )
+        return float(0.5 * self.penalty * np.sum(weight * found.overlap**2))
+
+
+def _search(mesh: FibrilMesh, table: CurveTable, points: Floats, candidates: Candidates, r: Floats) -> Touching:
+    """Closest points of all candidates, in pieces on all cores; the result does not depend on their number."""
+    hull = bezier(table, r)
+    thirds = hull[:, :1] + np.array([[1.0], [2.0]]) / 3 * (hull[:, 3:] - hull[:, :1])
+    bulge = 0.75 * np.sqrt(((hull[:, 1:3] - thirds) ** 2).sum(axis=2)).max(axis=1)
+    shape = (len(candidates.interval), points.shape[1])
+    position, overlap = np.zeros(shape), np.empty(shape)
+
+    def piece(part: slice) -> None:
+        find_contacts(
+            r,
+            mesh.radius,
+            BASIS,
+            table.window,
+            table.kind,
+            table.first_interval,
+            mesh.first_node,
+            table.fibril,
+            bulge,
+            points,
+            candidates.interval[part],
+            candidates.fibril[part],
+            candidates.first[part],
+            candidates.last[part],
+            position[part],
+            overlap[part],
+        )
+
+    edges = np.linspace(0, shape[0], CHUNKS + 1).astype(int)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(piece, map(slice, edges[:-1], edges[1:])))
+    row, p = np.nonzero(overlap > 0)
+    interval = candidates.interval[row]
+    first = table.first_interval[table.fibril[interval]]
+    return Touching(
+        interval_a=interval,
+        t_a=points[(interval - first) % len(points), p],
+        fibril_b=candidates.fibril[row],
+        position_b=position[row, p],
+        overlap=overlap[row, p],
+    )

@@ -1,0 +1,30 @@
+"""What the user states: a frozen, validated `Design`, from TOML, from a mapping, or from Python."""
+
+from circuittex.design.experiment import Gradient, Loading, Probe, Terminal, biaxial, equal_steps, shear, uniaxial
+from circuittex.design.fabric import ContactLaw, Material, Weave, Yarn
+from circuittex.design.files import load_design, parse_design, starter
+from circuittex.design.paper import plain_weave
+from circuittex.design.statement import Design, Electrical, Numerics, design_hash
+
+__all__ = [
+    "ContactLaw",
+    "Design",
+    "Electrical",
+    "Gradient",
+    "Loading",
+    "Material",
+    "Numerics",
+    "Probe",
+    "Terminal",
+    "Weave",
+    "Yarn",
+    "biaxial",
+    "design_hash",
+    "equal_steps",
+    "load_design",
+    "parse_design",
+    "plain_weave",
+    "shear",
+    "starter",
+    "uniaxial",
+]

@@ -1,0 +1,150 @@
+"""What is done to a textile: loadings, and electrical probes between terminals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from math import inf
+
+from circuittex.design.checks import name, real, refuse, store
+from circuittex.frozen import frozen
+
+Gradient = tuple[tuple[float, float], tuple[float, float]]
+"""In-plane deformation gradient ((Fxx, Fxy), (Fyx, Fyy))."""
+
+
+@frozen
+class Loading:
+    """A sequence of recorded states, each an average in-plane deformation gradient from the relaxed state.
+
+    >>> Loading("stretch", (((1.025, 0.0), (0.0, 1.0)),), (0.025,)).strains
+    (0.025,)
+    """
+
+    name: str
+    gradients: tuple[Gradient, ...]
+    """((Fxx, Fxy), (Fyx, Fyy)) of each state."""
+    strains: tuple[float, ...]
+    """The strain that labels each state."""
+
+    def __post_init__(self) -> None:
+        at = f"loading.{name(self.name, 'loading.name')}"
+        if not self.gradients:
+            raise refuse(f"{at}.gradients", self.gradients, "at least one state is needed")
+        if len(self.strains) != len(self.gradients):
+            raise refuse(
+                f"{at}.strains", len(self.strains), f"{len(self.gradients)} gradients need one strain each as a label"
+            )
+        store(
+            self,
+            gradients=tuple(check_gradient(F, f"{at}.gradients[{i}]") for i, F in enumerate(self.gradients)),
+            strains=tuple(real(e, f"{at}.strains[{i}]") for i, e in enumerate(self.strains)),
+        )
+
+
+def uniaxial(name: str, strains: Sequence[float], axis: str = "x") -> Loading:
+    """Stretch along `axis` with the other direction held: F = I + e e_axis x e_axis.
+
+    >>> uniaxial("stretch", equal_steps(0.1, 4)).gradients[3]
+    ((1.1, 0.0), (0.0, 1.0))
+    """
+    along_x = axis == "x"
+    gradients = tuple(((1.0 + e, 0.0), (0.0, 1.0)) if along_x else ((1.0, 0.0), (0.0, 1.0 + e)) for e in strains)
+    return Loading(name, gradients, tuple(strains))
+
+
+def biaxial(name: str, strains: Sequence[float]) -> Loading:
+    """Equal stretch of both directions: F = (1 + e) I.
+
+    >>> biaxial("swell", [0.5]).gradients
+    (((1.5, 0.0), (0.0, 1.5)),)
+    """
+    return Loading(name, tuple(((1.0 + e, 0.0), (0.0, 1.0 + e)) for e in strains), tuple(strains))
+
+
+def shear(name: str, strains: Sequence[float]) -> Loading:
+    """Simple shear, y displacement proportional to X: F = I + g e2 x e1.
+
+    >>> shear("shear", [0.25]).gradients
+    (((1.0, 0.0), (0.25, 1.0)),)
+    """
+    return Loading(name, tuple(((1.0, 0.0), (g, 1.0)) for g in strains), tuple(strains))
+
+
+def equal_steps(strain: float, steps: int) -> tuple[float, ...]:
+    """`steps` strains up to `strain`, each the float nearest to its decimal value.
+
+    >>> equal_steps(0.1, 4)
+    (0.025, 0.05, 0.075, 0.1)
+    """
+    exact = Fraction(repr(strain))
+    return tuple(float(exact * i / steps) for i in range(1, steps + 1))
+
+
+def check_gradient(gradient: object, field: str) -> Gradient:
+    """An in-plane deformation gradient with positive determinant.
+
+    >>> check_gradient([[1.1, 0], [0, 1]], "loading.stretch.gradients[0]")
+    ((1.1, 0.0), (0.0, 1.0))
+    """
+    shape = "it must be a matrix [[Fxx, Fxy], [Fyx, Fyy]]"
+    if not isinstance(gradient, list | tuple) or len(gradient) != 2:
+        raise refuse(field, gradient, shape)
+    if any(not isinstance(row, list | tuple) or len(row) != 2 for row in gradient):
+        raise refuse(field, gradient, shape)
+    (xx, xy), (yx, yy) = (tuple(real(v, f"{field}[{i}]") for v in row) for i, row in enumerate(gradient))
+    if not 0.0 < xx * yy - xy * yx < inf:
+        raise refuse(field, gradient, "its determinant must be > 0 (no area may vanish or turn over)")
+    return (xx, xy), (yx, yy)
+
+
+@frozen
+class Terminal:
+    """A named set of yarn ends whose fibril ends are joined.
+
+    >>> Terminal("right", (("warp2", +1),)).ends
+    (('warp2', 1),)
+    """
+
+    name: str
+    ends: tuple[tuple[str, int], ...]
+    """(yarn name, side): -1 for the end at xi3 = 0, +1 for the end at xi3 = L."""
+
+    def __post_init__(self) -> None:
+        at = f"terminals.{name(self.name, 'terminals')}"
+        if not self.ends:
+            raise refuse(at, [], "it must list at least one yarn end, such as 'warp2+'")
+        seen: set[tuple[str, int]] = set()
+        for yarn, side in self.ends:
+            label = f"{yarn}{'+' if side > 0 else '-'}"
+            if side not in (-1, 1):
+                raise refuse(at, side, "the side of a yarn end must be -1 or +1")
+            if (yarn, side) in seen:
+                raise refuse(at, label, "it is listed twice")
+            seen.add((yarn, side))
+        store(self, ends=tuple((yarn, int(side)) for yarn, side in self.ends))
+
+
+@frozen
+class Probe:
+    """A measurement: current flows from the source terminal, at `voltage`, to the sink, at 0 V.
+
+    >>> Probe("straight", "left", "right", 1.0).voltage
+    1.0
+    """
+
+    name: str
+    source: str
+    """Terminal name."""
+    sink: str
+    """Terminal name."""
+    voltage: float
+    """V."""
+
+    def __post_init__(self) -> None:
+        at = f"probes.{name(self.name, 'probes.name')}"
+        store(self, voltage=real(self.voltage, f"{at}.voltage", "V"))
+        if self.voltage == 0.0:
+            raise refuse(f"{at}.voltage", self.voltage, "it must not be 0 V, or no current flows")
+        if self.source == self.sink:
+            raise refuse(f"{at}.sink", self.sink, "it must be another terminal than the source")

@@ -1,0 +1,206 @@
+"""What a textile consists of: materials, yarns, the weave, and the law of contact between fibrils."""
+
+from __future__ import annotations
+
+from math import pi
+
+from circuittex.design.checks import name, real, refuse, store, whole
+from circuittex.frozen import frozen
+
+MOST_FIBRILS = 10_000
+"""Fibrils of one yarn."""
+
+
+@frozen
+class Material:
+    """What a fibril is made of: compressible Neo-Hookean [1], ohmic, heat conducting.
+
+    >>> Material("silver", 10.0, 0.0, 1.0, 10.0, 1.0).electrical_conductivity
+    10.0
+    """
+
+    name: str
+    youngs_modulus: float
+    """E, MPa."""
+    poisson_ratio: float
+    """nu, from 0 to 0.45."""
+    density: float
+    """rho, g/mm3."""
+    electrical_conductivity: float
+    """sigma, S/mm; 0 for an insulator."""
+    thermal_conductivity: float
+    """k, W/(mm K)."""
+
+    def __post_init__(self) -> None:
+        at = f"materials.{name(self.name, 'materials')}"
+        store(
+            self,
+            youngs_modulus=real(self.youngs_modulus, f"{at}.youngs_modulus", "MPa", above=0),
+            poisson_ratio=real(self.poisson_ratio, f"{at}.poisson_ratio", at_least=0, at_most=0.45),
+            density=real(self.density, f"{at}.density", "g/mm3", above=0),
+            electrical_conductivity=real(
+                self.electrical_conductivity, f"{at}.electrical_conductivity", "S/mm", at_least=0
+            ),
+            thermal_conductivity=real(self.thermal_conductivity, f"{at}.thermal_conductivity", "W/(mm K)", above=0),
+        )
+
+
+@frozen
+class Yarn:
+    """A kind of yarn: parallel fibrils packed in rows, the bottom row first.
+
+    Fibrils are numbered row by row, within a row towards growing y (warp) or x (weft).
+
+    >>> silver = Material("silver", 10.0, 0.0, 1.0, 10.0, 1.0)
+    >>> Yarn("conductive", (3, 4, 3), 0.15, 0.3, 0.3, (silver,) * 10).n_fibrils
+    10
+    """
+
+    name: str
+    rows: tuple[int, ...]
+    """Fibrils in each row."""
+    radius: float
+    """R of every fibril, mm."""
+    spacing: float
+    """Distance of neighbours within a row, mm."""
+    row_spacing: float
+    """Vertical distance of neighbouring rows, mm."""
+    materials: tuple[Material, ...]
+    """One for each fibril."""
+
+    def __post_init__(self) -> None:
+        at = f"yarns.{name(self.name, 'yarns')}"
+        rows = check_rows(self.rows, f"{at}.rows")
+        if len(self.materials) != sum(rows):
+            raise refuse(
+                f"{at}.materials", len(self.materials), f"{sum(rows)} fibrils (rows) need one material each, row by row"
+            )
+        store(
+            self,
+            rows=rows,
+            radius=real(self.radius, f"{at}.radius", "mm", above=0),
+            spacing=real(self.spacing, f"{at}.spacing", "mm", above=0),
+            row_spacing=real(self.row_spacing, f"{at}.row_spacing", "mm", above=0),
+            materials=tuple(self.materials),
+        )
+
+    @property
+    def n_fibrils(self) -> int:
+        return sum(self.rows)
+
+
+def check_rows(rows: object, field: str) -> tuple[int, ...]:
+    """The numbers of fibrils in each row, checked before anything of that size is made.
+
+    >>> check_rows([3, 4, 3], "yarns.conductive.rows")
+    (3, 4, 3)
+    """
+    if not isinstance(rows, list | tuple) or not rows:
+        raise refuse(field, rows, "it must be a list with the number of fibrils in each row, such as [3, 4, 3]")
+    checked = tuple(whole(n, f"{field}[{i}]", 1, MOST_FIBRILS) for i, n in enumerate(rows))
+    if sum(checked) > MOST_FIBRILS:
+        raise refuse(field, sum(checked), f"a yarn has at most {MOST_FIBRILS} fibrils")
+    return checked
+
+
+@frozen
+class Weave:
+    """Which yarn passes over which, and how far apart they are.
+
+    ``draft[i][j] = 1``: warp i passes over weft j. Warp yarns run along x (the first has the
+    smallest y), weft yarns along y (the first has the smallest x).
+    """
+
+    draft: tuple[tuple[int, ...], ...]
+    """One row for each warp yarn, one column for each weft yarn."""
+    warp: tuple[Yarn, ...]
+    """The kind of each warp yarn."""
+    weft: tuple[Yarn, ...]
+    """The kind of each weft yarn."""
+    pitch: float
+    """Distance of neighbouring yarn axes in both directions, mm."""
+    amplitude: float
+    """Height H of a yarn axis above or below the mid-plane at a crossing, mm."""
+
+    def __post_init__(self) -> None:
+        store(
+            self,
+            draft=check_draft(self.draft, "weave.draft"),
+            warp=tuple(self.warp),
+            weft=tuple(self.weft),
+            pitch=real(self.pitch, "weave.pitch", "mm", above=0),
+            amplitude=real(self.amplitude, "weave.amplitude", "mm", at_least=0),
+        )
+        for which, wanted in (("warp", len(self.draft)), ("weft", len(self.draft[0]))):
+            if len(getattr(self, which)) != wanted:
+                side = "row" if which == "warp" else "column"
+                raise refuse(
+                    f"weave.{which}", len(getattr(self, which)), f"the draft needs {wanted} yarns, one for each {side}"
+                )
+        self._check_curvature()
+
+    def _check_curvature(self) -> None:
+        # The section at a crest turns inside out where R >= radius of curvature = pitch^2 / (pi^2 H).
+        radius = max(yarn.radius for yarn in self.warp + self.weft)
+        largest = self.pitch**2 / (pi**2 * radius)
+        if self.amplitude >= largest:
+            raise refuse(
+                "weave.amplitude",
+                self.amplitude,
+                f"fibrils of radius {radius:g} mm at a pitch of {self.pitch:g} mm cannot bend that far; "
+                f"it must be < {largest:.4g} mm (pitch^2 / (pi^2 radius))",
+            )
+
+    @property
+    def yarns(self) -> tuple[Yarn, ...]:
+        """All yarns, the warp first: the order of the mesh."""
+        return self.warp + self.weft
+
+    @property
+    def yarn_names(self) -> tuple[str, ...]:
+        """warp1, warp2, ..., weft1, weft2, ... in the order of `yarns`."""
+        warp = tuple(f"warp{i + 1}" for i in range(len(self.warp)))
+        return warp + tuple(f"weft{j + 1}" for j in range(len(self.weft)))
+
+
+def check_draft(draft: object, field: str) -> tuple[tuple[int, ...], ...]:
+    """The draft as a rectangular matrix of 0 and 1.
+
+    >>> check_draft([[1, 0], [0, 1]], "weave.draft")
+    ((1, 0), (0, 1))
+    """
+    rows_wanted = "it must be a list of rows of 0 and 1, one row for each warp yarn"
+    if not isinstance(draft, list | tuple) or not draft:
+        raise refuse(field, draft, rows_wanted)
+    for i, row in enumerate(draft):
+        if not isinstance(row, list | tuple) or not row:
+            raise refuse(f"{field}[{i}]", row, rows_wanted)
+        if len(row) != len(draft[0]):
+            raise refuse(f"{field}[{i}]", row, f"every row must have as many entries as the first, {len(draft[0])}")
+    return tuple(
+        tuple(whole(cell, f"{field}[{i}][{j}]", 0, 1) for j, cell in enumerate(row)) for i, row in enumerate(draft)
+    )
+
+
+@frozen
+class ContactLaw:
+    """How fibrils push, conduct and warm one another where they touch [28, 30, 31].
+
+    >>> ContactLaw(5.0, 0.01, 0.1).penalty
+    5.0
+    """
+
+    penalty: float
+    """P*, N/mm2: line load per overlap."""
+    conductivity: float
+    """sigma_c, S/mm2."""
+    heat_transfer: float
+    """h_c, W/(mm2 K)."""
+
+    def __post_init__(self) -> None:
+        store(
+            self,
+            penalty=real(self.penalty, "contact.penalty", "N/mm2", above=0),
+            conductivity=real(self.conductivity, "contact.conductivity", "S/mm2", at_least=0),
+            heat_transfer=real(self.heat_transfer, "contact.heat_transfer", "W/(mm2 K)", at_least=0),
+        )

@@ -1,0 +1,77 @@
+"""Designs in TOML files and nested mappings."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from importlib.resources import files
+from os import PathLike
+from pathlib import Path
+
+from circuittex.design.checks import refuse
+from circuittex.design.reader import read_design
+from circuittex.design.statement import Design
+from circuittex.errors import DesignError
+
+_LARGEST_FILE = 10_000_000  # bytes; a draft of a thousand by a thousand yarns takes a third of it
+
+
+def load_design(path: str | PathLike[str]) -> Design:
+    """The design in the TOML file at `path`.
+
+    Raises `DesignError` for a file that cannot be read, is not TOML, or states something impossible.
+    """
+    where = str(path)
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(_LARGEST_FILE + 1)
+        text = data.decode("utf-8-sig")
+    except FileNotFoundError:
+        raise refuse("design file", where, "there is no such file") from None
+    except IsADirectoryError:
+        raise refuse("design file", where, "it must be a TOML file, this is a directory") from None
+    except UnicodeDecodeError as error:
+        raise refuse("design file", where, f"it must be text in UTF-8; byte {error.start} is not") from None
+    except (OSError, ValueError) as error:
+        raise refuse("design file", where, f"it cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if len(data) > _LARGEST_FILE:
+        raise refuse("design file", where, f"a design file has at most {_LARGEST_FILE} bytes")
+    return parse_design(_toml(text))
+
+
+def parse_design(mapping: Mapping[str, object]) -> Design:
+    """The design that a mapping of the layout of `starter` states.
+
+    >>> parse_design({"format": 1, "nam": "x"})
+    Traceback (most recent call last):
+    circuittex.errors.DesignError: nam: 'x' is not usable; it is an unknown key, did you mean 'name'?
+    """
+    return read_design(mapping)
+
+
+def starter() -> str:
+    """A commented design to start from: the paper's cell with a 10 % stretch, every key explained.
+
+    >>> parse_design(tomllib.loads(starter())).weave.yarn_names[0]
+    'warp1'
+    """
+    return files("circuittex").joinpath("data/starter.toml").read_text(encoding="utf-8")
+
+
+def _toml(text: str) -> Mapping[str, object]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise _syntax_error(text, str(error)) from None
+    except RecursionError:
+        raise refuse("design file", "TOML", "it is nested too deeply") from None
+    except ValueError as error:  # a whole number of thousands of digits, for example
+        raise refuse("design file", "TOML", f"it cannot be read: {error}") from None
+
+
+def _syntax_error(text: str, message: str) -> DesignError:
+    """The parser's complaint with the line it is about: "... (at line 3, column 7)"."""
+    number = message.partition("(at line ")[2].partition(",")[0]
+    lines = text.splitlines()
+    line = lines[int(number) - 1] if number.isdigit() and int(number) <= len(lines) else (lines or [""])[-1]
+    return refuse(f"TOML, line {number or len(lines)}", line.strip(), f"it is not valid TOML: {message}")

@@ -1,0 +1,258 @@
+"""Reading a design from nested mappings (TOML): keys, types and units; the dataclasses check the rest."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from math import hypot, inf
+from typing import TypeVar
+
+from circuittex.design.checks import is_name, name, one_of, real, refuse, whole
+from circuittex.design.experiment import (
+    Gradient,
+    Loading,
+    Probe,
+    Terminal,
+    biaxial,
+    check_gradient,
+    equal_steps,
+    shear,
+    uniaxial,
+)
+from circuittex.design.fabric import ContactLaw, Material, Weave, Yarn, check_draft, check_rows
+from circuittex.design.statement import FORMAT, Design, Electrical, Numerics
+from circuittex.design.table import Table, quantity
+
+MOST_STATES = 10_000
+"""Recorded states of one loading."""
+
+_T = TypeVar("_T")
+_END = re.compile(r"([A-Za-z0-9_-]+?)([+-])", re.ASCII)
+
+_MATERIAL_UNITS = {
+    "youngs_modulus": "MPa",
+    "poisson_ratio": "1",
+    "density": "g/mm3",
+    "electrical_conductivity": "S/mm",
+    "thermal_conductivity": "W/(mm K)",
+}
+_CONTACT_UNITS = {"penalty": "N/mm2", "conductivity": "S/mm2", "heat_transfer": "W/(mm2 K)"}
+_NUMERICS_UNITS = {"tolerance": "N", "merge_length": "mm", "snap_length": "mm", "drop_fraction": "1"}
+_LOADING_KEYS = {
+    "uniaxial": ("strain", "steps", "strains", "axis"),
+    "biaxial": ("strain", "steps", "strains"),
+    "shear": ("strain", "steps", "strains"),
+    "path": ("gradients", "strains"),
+}
+
+
+def read_design(mapping: object) -> Design:
+    """The design stated by a mapping of the layout of the starter design."""
+    top = Table(
+        mapping,
+        "",
+        (
+            "format",
+            "name",
+            "materials",
+            "yarns",
+            "weave",
+            "contact",
+            "loading",
+            "terminals",
+            "probes",
+            "electrical",
+            "numerics",
+        ),
+    )
+    version = top.get("format", f"format = {FORMAT} states the layout of the file")
+    if isinstance(version, bool) or version != FORMAT:
+        raise refuse("format", version, f"this version reads format = {FORMAT}")
+    title = top.text("name", "a title for the design")
+    materials = _named(top, "materials", _material)
+    yarns = _named(top, "yarns", lambda value, path, label: _yarn(value, path, label, materials))
+    return Design(
+        name=title,
+        weave=_weave(top.get("weave", "a table [weave]"), yarns),
+        contact=_contact(top.get("contact", "a table [contact]")),
+        loading=tuple(_loading(value, path) for value, path in _entries(top, "loading")),
+        terminals=tuple(_named(top, "terminals", _terminal, optional=True).values()),
+        probes=tuple(_probe(value, path) for value, path in _entries(top, "probes")),
+        electrical=_electrical(top.value.get("electrical", {})),
+        numerics=_numerics(top.value.get("numerics", {})),
+    )
+
+
+def _named(top: Table, key: str, read: Callable[[object, str, str], _T], *, optional: bool = False) -> dict[str, _T]:
+    """The entries of a table of named things, `[key.NAME]`."""
+    if optional and not top.has(key):
+        return {}
+    table = Table(top.get(key, f"at least one table [{key}.NAME]"), key, None)
+    if not optional and not table.value:
+        raise refuse(key, {}, f"at least one table [{key}.NAME] is needed")
+    return {label: read(value, table.at(label), name(label, table.at(label))) for label, value in table.value.items()}
+
+
+def _entries(top: Table, key: str) -> Iterator[tuple[object, str]]:
+    """The entries of an array of tables, `[[key]]`, with the best path there is for each."""
+    if not top.has(key):
+        return
+    for i, value in enumerate(top.items(key, f"tables [[{key}]]")):
+        label = value.get("name") if isinstance(value, Mapping) else None
+        yield value, f"{key}.{label}" if isinstance(label, str) and is_name(label) else f"{key}[{i}]"
+
+
+def _material(value: object, path: str, label: str) -> Material:
+    table = Table(value, path, tuple(_MATERIAL_UNITS))
+    return Material(label, **{key: table.number(key, unit) for key, unit in _MATERIAL_UNITS.items()})
+
+
+def _yarn(value: object, path: str, label: str, materials: Mapping[str, Material]) -> Yarn:
+    table = Table(value, path, ("rows", "radius", "spacing", "row_spacing", "material", "materials"))
+    rows = check_rows(table.get("rows", "the number of fibrils in each row, such as [3, 4, 3]"), table.at("rows"))
+    spacing = table.number("spacing", "mm")
+    return Yarn(
+        name=label,
+        rows=rows,
+        radius=table.number("radius", "mm"),
+        spacing=spacing,
+        row_spacing=table.number("row_spacing", "mm") if table.has("row_spacing") else spacing,
+        materials=_fibril_materials(table, sum(rows), materials),
+    )
+
+
+def _fibril_materials(table: Table, n_fibrils: int, materials: Mapping[str, Material]) -> tuple[Material, ...]:
+    if table.has("material") and table.has("materials"):
+        raise refuse(table.at("materials"), table.value["materials"], "give either material or materials, not both")
+    if table.has("materials"):
+        wanted = f"{n_fibrils} material names, one for each fibril, row by row"
+        listed = table.items("materials", wanted)
+        if len(listed) != n_fibrils:
+            raise refuse(table.at("materials"), len(listed), f"the rows need {wanted}")
+        return tuple(_choice(item, f"{table.at('materials')}[{i}]", materials) for i, item in enumerate(listed))
+    chosen = _choice(table.get("material", "the name of a material"), table.at("material"), materials)
+    return (chosen,) * n_fibrils
+
+
+def _weave(value: object, yarns: Mapping[str, Yarn]) -> Weave:
+    table = Table(value, "weave", ("draft", "warp", "weft", "pitch", "amplitude"))
+    draft = check_draft(table.get("draft", "a matrix of 0 and 1, one row for each warp yarn"), "weave.draft")
+    return Weave(
+        draft=draft,
+        warp=_weave_yarns(table, "warp", len(draft), yarns),
+        weft=_weave_yarns(table, "weft", len(draft[0]), yarns),
+        pitch=table.number("pitch", "mm"),
+        amplitude=table.number("amplitude", "mm"),
+    )
+
+
+def _weave_yarns(table: Table, key: str, n: int, yarns: Mapping[str, Yarn]) -> tuple[Yarn, ...]:
+    value = table.get(key, "the name of a yarn, or a list of names")
+    if not isinstance(value, list | tuple):
+        return (_choice(value, table.at(key), yarns),) * n
+    return tuple(_choice(item, f"{table.at(key)}[{i}]", yarns) for i, item in enumerate(value))
+
+
+def _contact(value: object) -> ContactLaw:
+    table = Table(value, "contact", tuple(_CONTACT_UNITS))
+    return ContactLaw(**{key: table.number(key, unit) for key, unit in _CONTACT_UNITS.items()})
+
+
+def _loading(value: object, path: str) -> Loading:
+    table = Table(value, path, ("name", "kind", "axis", "strain", "steps", "strains", "gradients"))
+    label = name(table.get("name", "a name for the loading"), table.at("name"))
+    kinds = tuple(_LOADING_KEYS)
+    kind = one_of(table.get("kind", "one of " + ", ".join(map(repr, kinds))), table.at("kind"), kinds)
+    for key in table.value:
+        if key not in ("name", "kind", *_LOADING_KEYS[kind]):
+            allowed = ", ".join(map(repr, _LOADING_KEYS[kind]))
+            raise refuse(table.at(key), table.value[key], f"a loading of kind {kind!r} takes {allowed}")
+    if kind == "path":
+        return _path(table, label)
+    strains = _strains(table, above=-inf if kind == "shear" else -1.0)
+    if kind == "uniaxial":
+        return uniaxial(label, strains, one_of(table.value.get("axis", "x"), table.at("axis"), ("x", "y")))
+    return shear(label, strains) if kind == "shear" else biaxial(label, strains)
+
+
+def _path(table: Table, label: str) -> Loading:
+    listed = table.items("gradients", "one matrix [[Fxx, Fxy], [Fyx, Fyy]] for each state")
+    _limit(table, "gradients", len(listed))
+    gradients = tuple(check_gradient(F, f"{table.at('gradients')}[{i}]") for i, F in enumerate(listed))
+    labels = _numbers(table, "strains") if table.has("strains") else tuple(_size(F) for F in gradients)
+    return Loading(label, gradients, labels)
+
+
+def _size(gradient: Gradient) -> float:
+    """Spectral norm of F - I, which is |e| for a uniaxial or biaxial stretch and |g| for a shear."""
+    (a, b), (c, d) = gradient
+    a, d = a - 1.0, d - 1.0
+    return (hypot(a + d, b - c) + hypot(a - d, b + c)) / 2.0
+
+
+def _strains(table: Table, above: float) -> tuple[float, ...]:
+    """Either `strains` as listed, or `steps` equal ones up to `strain`."""
+    if table.has("strains"):
+        for key in ("strain", "steps"):
+            if table.has(key):
+                raise refuse(table.at(key), table.value[key], "give either strains, or strain and steps, not both")
+        listed = _numbers(table, "strains")
+        if not listed:
+            raise refuse(table.at("strains"), [], "at least one strain is needed")
+        return tuple(real(e, f"{table.at('strains')}[{i}]", above=above) for i, e in enumerate(listed))
+    strain = real(table.number("strain", "1"), table.at("strain"), above=above)
+    if strain == 0.0:
+        raise refuse(table.at("strain"), strain, "it must not be 0; the relaxed state is recorded anyway")
+    steps = table.get("steps", "a whole number of equal steps")
+    return equal_steps(strain, whole(steps, table.at("steps"), 1, MOST_STATES))
+
+
+def _numbers(table: Table, key: str) -> tuple[float, ...]:
+    listed = table.items(key, "plain numbers")
+    _limit(table, key, len(listed))
+    return tuple(quantity(value, "1", f"{table.at(key)}[{i}]") for i, value in enumerate(listed))
+
+
+def _limit(table: Table, key: str, states: int) -> None:
+    if states > MOST_STATES:
+        raise refuse(table.at(key), states, f"a loading has at most {MOST_STATES} states")
+
+
+def _terminal(value: object, path: str, label: str) -> Terminal:
+    wanted = "it must be a list of yarn ends, such as ['warp2+', 'weft1-']"
+    if not isinstance(value, list | tuple):
+        raise refuse(path, value, wanted)
+    ends = []
+    for i, item in enumerate(value):
+        match = _END.fullmatch(item) if isinstance(item, str) else None
+        if match is None:
+            raise refuse(f"{path}[{i}]", item, "it must be a yarn name followed by + or -, such as 'warp2+'")
+        ends.append((match[1], 1 if match[2] == "+" else -1))
+    return Terminal(label, tuple(ends))
+
+
+def _probe(value: object, path: str) -> Probe:
+    table = Table(value, path, ("name", "source", "sink", "voltage"))
+    return Probe(
+        name=name(table.get("name", "a name for the probe"), table.at("name")),
+        source=table.text("source", "the name of a terminal"),
+        sink=table.text("sink", "the name of a terminal"),
+        voltage=table.number("voltage", "V"),
+    )
+
+
+def _electrical(value: object) -> Electrical:
+    return Electrical(**Table(value, "electrical", ("conduction", "contact_heat")).value)
+
+
+def _numerics(value: object) -> Numerics:
+    known = tuple(Numerics.__dataclass_fields__)
+    table = Table(value, "numerics", known)
+    numbers = {key: table.number(key, unit) for key, unit in _NUMERICS_UNITS.items() if table.has(key)}
+    return Numerics(**{**table.value, **numbers})
+
+
+def _choice(value: object, path: str, known: Mapping[str, _T]) -> _T:
+    if not isinstance(value, str) or value not in known:
+        raise refuse(path, value, "it must be one of " + ", ".join(map(repr, known)))
+    return known[value]

@@ -1,0 +1,37 @@
+"""The errors circuittex raises on purpose, each with a message meant for its user."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class CircuittexError(Exception):
+    """Base of every error that circuittex raises on purpose."""
+
+
+class DesignError(CircuittexError, ValueError):
+    """A design (or an argument) that cannot be used: names the field, the value and what is allowed."""
+
+    def __init__(self, field: str, value: object, allowed: str) -> None:
+        self.field, self.value, self.allowed = field, value, allowed
+        super().__init__(f"{field}: {value!r} is not usable; {allowed}")
+
+
+class ConvergenceError(CircuittexError, RuntimeError):
+    """An equilibrium that was not reached; `history` holds one row per iteration."""
+
+    def __init__(self, message: str, history: Any = ()) -> None:
+        self.history = history
+        super().__init__(message)
+
+
+class CircuitError(CircuittexError, ValueError):
+    """A circuit that has no unique solution or cannot be written."""
+
+
+class NgspiceError(CircuittexError, RuntimeError):
+    """ngspice is missing, failed, hung, or answered something that cannot be trusted."""
+
+
+class StoreError(CircuittexError, ValueError):
+    """A results file that cannot be read: missing, damaged, or of another version."""

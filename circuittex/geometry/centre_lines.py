@@ -1,0 +1,121 @@
+"""The initial centre lines and directors of a weave's fibrils, in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from circuittex.design import Weave, Yarn
+from circuittex.frozen import frozen
+from circuittex.geometry.mesh import Floats, Ints
+
+
+@frozen
+class CentreLines:
+    """F fibrils sampled at K places each: the warp's yarns first, each fibril after fibril."""
+
+    yarn: Ints
+    """(F,) yarn of each fibril."""
+    length: Floats
+    """(F,) natural length, mm."""
+    xi: Floats
+    """(F, K) axis coordinate from 0 to the natural length, mm."""
+    position: Floats
+    """(F, K, 3) r, mm."""
+    directors: Floats
+    """(F, K, 2, 3) unit directors g1, g2."""
+
+
+def centre_lines(weave: Weave, n_places: int) -> CentreLines:
+    """Centre lines and directors at `n_places` equally spaced places on every fibril.
+
+    r(xi3) = yarn axis(s) + lateral offset + row offset with s = xi3 - L/2. The row offset is vertical, as in
+    the paper's start, so rows come closer than their spacing where the yarn rises. The natural length L is
+    that of the straight yarn, crossings x pitch; the clamped wave is longer, so fibrils start in tension.
+
+    >>> from circuittex.design import plain_weave
+    >>> centre_lines(plain_weave().weave, 5).position.shape
+    (80, 5, 3)
+    """
+    fibrils = [kind.n_fibrils for kind in weave.yarns]
+    yarn = np.repeat(np.arange(len(weave.yarns)), fibrils)
+    along_x = yarn < len(weave.warp)
+    length = np.where(along_x, len(weave.weft), len(weave.warp)) * weave.pitch
+    xi = length[:, None] * np.linspace(0.0, 1.0, n_places)
+    s = xi - length[:, None] / 2.0
+    offsets = np.concatenate([section_offsets(kind) for kind in weave.yarns])
+    places = weave.pitch * np.concatenate([_centred(len(weave.warp)), _centred(len(weave.weft))])
+    across = np.broadcast_to((places[yarn] + offsets[:, 0])[:, None], s.shape)
+    height, slope = _axis_heights(weave, yarn, s)
+    warp = along_x[:, None]
+    position = np.stack([np.where(warp, s, across), np.where(warp, across, s), height + offsets[:, 1:]], axis=-1)
+    return CentreLines(yarn, length, xi, position, _directors(slope, warp))
+
+
+def section_offsets(yarn: Yarn) -> Floats:
+    """(n, 2) lateral and vertical place of each fibril in the section of its yarn, mm, row by row from below.
+
+    >>> from circuittex.design import plain_weave
+    >>> section_offsets(plain_weave(rows=(1, 2)).weave.warp[0])
+    array([[ 0.  , -0.15],
+           [-0.15,  0.15],
+           [ 0.15,  0.15]])
+    """
+    heights = _centred(len(yarn.rows)) * yarn.row_spacing
+    lateral = np.concatenate([_centred(n) * yarn.spacing for n in yarn.rows])
+    return np.column_stack([lateral, np.repeat(heights, yarn.rows)])
+
+
+def yarn_height(u: Floats, sides: Ints) -> tuple[Floats, Floats]:
+    """Height of yarn axes over their amplitude, and its derivative, at places `u` counted in crossings.
+
+    Crossing j lies at u = j; `sides` (n, crossings) holds +1 (over) or -1 (under); `u` has shape (n, k).
+    Between neighbouring crossings on sides a and b the axis is a half cosine,
+
+        z = (a + b)/2 + (a - b)/2 cos(pi (u - j)),
+
+    hence constant along a float. Before the first and after the last crossing it continues as if the next
+    yarn lay on the other side, which brings it to z = 0 half a pitch further on, at the edge of the cell.
+    A 1/1 weave is the sine of the paper throughout.
+
+    >>> yarn_height(np.array([[0.0, 0.5, 1.0]]), np.array([[1, -1]]))[0].round(12) + 0.0
+    array([[ 1.,  0., -1.]])
+    """
+    padded = np.concatenate([-sides[:, :1], sides, -sides[:, -1:]], axis=1).astype(np.float64)
+    j = np.clip(np.floor(u).astype(np.int64), -1, sides.shape[1] - 1)
+    a, b = np.take_along_axis(padded, j + 1, axis=1), np.take_along_axis(padded, j + 2, axis=1)
+    phase = np.pi * (u - j)
+    return (a + b) / 2 + (a - b) / 2 * np.cos(phase), -np.pi * (a - b) / 2 * np.sin(phase)
+
+
+def _axis_heights(weave: Weave, yarn: Ints, s: Floats) -> tuple[Floats, Floats]:
+    """(F, K) height z and slope dz/ds of the yarn axis along each fibril."""
+    over: Ints = 2 * np.array(weave.draft, dtype=np.int64) - 1
+    n_warp = len(weave.warp)
+    split = int(np.searchsorted(yarn, n_warp))  # the warp's fibrils come first
+    warp_height, warp_slope = yarn_height(_in_crossings(s[:split], weave, over), over[yarn[:split]])
+    weft_height, weft_slope = yarn_height(_in_crossings(s[split:], weave, over.T), -over.T[yarn[split:] - n_warp])
+    slope = np.concatenate([warp_slope, weft_slope]) / weave.pitch
+    return weave.amplitude * np.concatenate([warp_height, weft_height]), weave.amplitude * slope
+
+
+def _in_crossings(s: Floats, weave: Weave, sides: Ints) -> Floats:
+    """Places along a yarn, counted in crossings from the first one."""
+    return np.asarray(s / weave.pitch + (sides.shape[1] - 1) / 2.0, dtype=np.float64)
+
+
+def _directors(slope: Floats, along_x: NDArray[np.bool_]) -> Floats:
+    """(F, K, 2, 3) unit directors turned with the tangent t: g1 horizontal, g2 = t x g1, det[g1 g2 t] = 1."""
+    up = 1.0 / np.sqrt(1.0 + slope**2)
+    directors: Floats = np.zeros((*slope.shape, 2, 3))
+    directors[..., 0, 0] = np.where(along_x, 0.0, -1.0)
+    directors[..., 0, 1] = np.where(along_x, 1.0, 0.0)
+    directors[..., 1, 0] = np.where(along_x, -slope * up, 0.0)
+    directors[..., 1, 1] = np.where(along_x, 0.0, -slope * up)
+    directors[..., 1, 2] = up
+    return directors
+
+
+def _centred(n: int) -> Floats:
+    """n numbers one apart, about zero."""
+    return np.arange(n, dtype=np.float64) - (n - 1) / 2.0

@@ -1,0 +1,86 @@
+"""The flat mesh of all fibrils: nodes, elements, and a table of fibril and yarn properties."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from circuittex.frozen import frozen
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@frozen
+class FibrilMesh:
+    """All fibrils of a fabric as one flat mesh, fibril after fibril, nodes in axis order.
+
+    N nodes, M elements, F fibrils, Y yarns; every fibril has its own straight axis [0, length].
+    The nodes of fibril f are ``first_node[f]:first_node[f + 1]``, its elements
+    ``first_element[f]:first_element[f + 1]``.
+    """
+
+    position: Floats
+    """(N, 3) initial centre line r, mm."""
+    directors: Floats
+    """(N, 2, 3) initial directors g1, g2 (dimensionless, unit length)."""
+    xi: Floats
+    """(N,) axis coordinate xi3 of each node, mm."""
+    elements: Ints
+    """(M, order + 1) node numbers of each element in axis order."""
+    first_node: Ints
+    """(F + 1,) offsets into the nodes."""
+    first_element: Ints
+    """(F + 1,) offsets into the elements."""
+    yarn: Ints
+    """(F,) yarn of each fibril."""
+    length: Floats
+    """(F,) natural length L, mm."""
+    radius: Floats
+    """(F,) section radius R, mm."""
+    youngs_modulus: Floats
+    """(F,) E, MPa."""
+    poisson_ratio: Floats
+    """(F,) nu."""
+    density: Floats
+    """(F,) rho, g/mm3."""
+    electrical_conductivity: Floats
+    """(F,) sigma, S/mm; 0 for an insulating fibril."""
+    thermal_conductivity: Floats
+    """(F,) k, W/(mm K)."""
+    yarn_names: tuple[str, ...]
+    """(Y,) for example 'warp1'; the warp runs along x, the weft along y."""
+    yarn_axis: Ints
+    """(Y,) 0 for a yarn along x, 1 along y."""
+
+    @property
+    def order(self) -> int:
+        """Polynomial order of the elements (1 or 2)."""
+        return int(self.elements.shape[1]) - 1
+
+    @property
+    def n_nodes(self) -> int:
+        return len(self.xi)
+
+    @property
+    def n_fibrils(self) -> int:
+        return len(self.yarn)
+
+    @property
+    def node_fibril(self) -> Ints:
+        """(N,) fibril of each node."""
+        return np.repeat(np.arange(self.n_fibrils), np.diff(self.first_node))
+
+    @property
+    def element_fibril(self) -> Ints:
+        """(M,) fibril of each element."""
+        return np.repeat(np.arange(self.n_fibrils), np.diff(self.first_element))
+
+    @property
+    def area(self) -> Floats:
+        """(F,) section area pi R^2, mm2."""
+        return np.pi * self.radius**2
+
+    def end_nodes(self, side: int) -> Ints:
+        """(F,) node at xi3 = 0 (`side` -1, the minus end) or at xi3 = L (`side` +1, the plus end)."""
+        return self.first_node[:-1] if side < 0 else self.first_node[1:] - 1

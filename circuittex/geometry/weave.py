@@ -1,0 +1,51 @@
+"""From a design to the flat mesh of its fibrils."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from circuittex.design import Design
+from circuittex.geometry.centre_lines import centre_lines
+from circuittex.geometry.mesh import FibrilMesh
+from circuittex.geometry.overlap import check_overlaps
+
+
+def build_mesh(design: Design) -> FibrilMesh:
+    """The flat mesh of all fibrils in their initial, unrelaxed positions: warp yarns first, each row by row.
+
+    Nodes are equally spaced in xi3; elements of order 2 have one in their middle. See `centre_lines` for
+    where the fibrils run.
+
+    Raises `DesignError` where fibrils start more than the smaller radius inside one another.
+
+    >>> from circuittex.design import plain_weave
+    >>> mesh = build_mesh(plain_weave())
+    >>> mesh.n_fibrils, mesh.n_nodes, mesh.order
+    (80, 3280, 2)
+    """
+    weave, numerics = design.weave, design.numerics
+    check_overlaps(weave)
+    n_nodes = numerics.order * numerics.elements + 1
+    lines = centre_lines(weave, n_nodes)
+    n_fibrils = len(lines.yarn)
+    first_node = np.arange(n_fibrils + 1) * n_nodes
+    within = np.arange(numerics.elements)[:, None] * numerics.order + np.arange(numerics.order + 1)
+    materials = [material for kind in weave.yarns for material in kind.materials]
+    return FibrilMesh(
+        position=lines.position.reshape(-1, 3),
+        directors=lines.directors.reshape(-1, 2, 3),
+        xi=lines.xi.reshape(-1),
+        elements=(first_node[:-1, None, None] + within).reshape(-1, numerics.order + 1),
+        first_node=first_node,
+        first_element=np.arange(n_fibrils + 1) * numerics.elements,
+        yarn=lines.yarn,
+        length=lines.length,
+        radius=np.array([kind.radius for kind in weave.yarns])[lines.yarn],
+        youngs_modulus=np.array([material.youngs_modulus for material in materials]),
+        poisson_ratio=np.array([material.poisson_ratio for material in materials]),
+        density=np.array([material.density for material in materials]),
+        electrical_conductivity=np.array([material.electrical_conductivity for material in materials]),
+        thermal_conductivity=np.array([material.thermal_conductivity for material in materials]),
+        yarn_names=weave.yarn_names,
+        yarn_axis=np.repeat([0, 1], [len(weave.warp), len(weave.weft)]),
+    )

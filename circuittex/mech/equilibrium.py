@@ -1,0 +1,159 @@
+"""Equilibrium as a minimum of the total potential: Newton's method that minimises.
+
+Each iteration solves (K + tau M) dq = -g with the exact tangent K, the mass matrix M and a shift tau that
+grows until the factorisation has no negative pivot and shrinks while full steps succeed, then searches
+along dq for a lower potential. This is dynamic relaxation with a step that adapts: a shift tau is a step
+of backward Euler with dt = tau^(-1/2) from rest. The iteration knows no physics; forces are `ForceTerm`s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from circuittex.errors import ConvergenceError
+from circuittex.frozen import frozen
+from circuittex.geometry.mesh import Floats, Ints
+from circuittex.mech.linear import LinearSolver, Solve
+from circuittex.mech.pattern import Pattern, build_pattern, diagonal
+from circuittex.mech.terms import ForceTerm
+
+FIRST_SHIFT, LEAST_SHIFT, LARGEST_SHIFT = 1e-2, 1e-5, 1e6
+"""Shifts in N/mm per g. The least keeps the fibrils' free spin about their axes, a true zero mode, solvable;
+it is a thousand times softer than the softest bending mode of the paper's fibrils."""
+ROUND_OFF = 1e-13
+"""Relative change of the potential that is round-off of its sum rather than an increase."""
+ARMIJO = 1e-4
+"""A step must achieve this part of the decrease that the slope promises (Nocedal & Wright, 3.1)."""
+
+
+@frozen
+class Minimum:
+    """A point where the potential's gradient vanishes on the free unknowns."""
+
+    q: Floats
+    """(n_dofs,) unknowns."""
+    gradient: Floats
+    """(n_dofs,) gradient of the potential, N: on prescribed unknowns the force of the supports."""
+    energy: float
+    """Potential, N mm."""
+    residual: float
+    """Largest magnitude of the gradient on the free unknowns, N."""
+    iterations: int
+    """Newton iterations (linear solves) spent."""
+    history: Floats
+    """(iterations + 1, 4) residual N, potential N mm, shift, step length of each."""
+
+
+@dataclass
+class _System:
+    """Pattern, mass and the values assembled in it; renewed when a term's couplings change."""
+
+    terms: Sequence[ForceTerm]
+    mass_of: Callable[[Pattern], Floats]
+    fixed: Ints
+    n: int
+    pattern: Pattern | None = None
+    mass: Floats = field(default_factory=lambda: np.empty(0))
+    data: Floats = field(default_factory=lambda: np.empty(0))
+    held: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+
+    def assemble(self, q: Floats) -> tuple[Pattern, float, Floats]:
+        changed = [term.prepare(q) for term in self.terms]
+        if self.pattern is None or any(changed):
+            pairs = [term.pairs() for term in self.terms]
+            full, point = (np.concatenate([p[k] for p in pairs]) for k in (0, 1))
+            self.pattern = build_pattern(self.n // 9, full, point)
+            self.mass = self.mass_of(self.pattern)
+            rows = np.repeat(np.arange(self.n), np.diff(self.pattern.indptr))
+            is_fixed = np.zeros(self.n, dtype=bool)
+            is_fixed[self.fixed] = True
+            self.held = np.flatnonzero(is_fixed[rows] | is_fixed[self.pattern.indices])
+        gradient, self.data = np.zeros(self.n), np.zeros(self.pattern.nnz)
+        energy = sum(term.assemble(q, self.pattern, gradient, self.data) for term in self.terms)
+        return self.pattern, energy, gradient
+
+    def factor(self, solver: LinearSolver, shift: float) -> Solve | None:
+        assert self.pattern is not None
+        values = self.data + shift * self.mass
+        values[self.held] = 0.0
+        values[diagonal(self.pattern)[self.fixed]] = 1.0
+        return solver.factor(self.pattern, values)
+
+    def energy(self, q: Floats) -> float:
+        return sum(term.energy(q) for term in self.terms)
+
+
+def minimise(
+    terms: Sequence[ForceTerm],
+    q: Floats,
+    *,
+    mass: Callable[[Pattern], Floats],
+    fixed: Ints,
+    solver: LinearSolver,
+    tolerance: float = 1e-6,
+    max_iterations: int = 200,
+    report: Callable[[int, float], None] | None = None,
+) -> Minimum:
+    """The minimum of the terms' total potential that a descent from q (n_dofs,) reaches.
+
+    `mass` gives the mass matrix in a pattern; `fixed` are the prescribed unknowns, kept as they are in q;
+    `tolerance` (N) bounds the largest free force; `report` is told of every iteration.
+
+    Raises `ConvergenceError`, with the history, where the tolerance is not met in `max_iterations`: an
+    unconverged state is never returned.
+    """
+    system = _System(terms, mass, fixed, len(q))
+    shift, step, history = FIRST_SHIFT, 1.0, []
+    free = np.ones(len(q), dtype=bool)
+    free[fixed] = False
+    for iteration in range(max_iterations + 1):
+        _, energy, gradient = system.assemble(q)
+        residual = float(np.abs(gradient[free]).max())
+        history.append((residual, energy, shift, step))
+        if report is not None:
+            report(iteration, residual)
+        if not np.isfinite(energy):
+            raise ConvergenceError("the potential is infinite: a fibril's section is inside out", np.array(history))
+        if residual <= tolerance:
+            return Minimum(q, gradient, energy, residual, iteration, np.array(history))
+        if iteration == max_iterations:
+            break
+        shift, solve = _positive_shift(system, solver, shift, history)
+        force = np.where(free, gradient, 0.0)
+        direction = solve(-force)
+        step = _search(system, q, direction, energy, float(force @ direction))
+        if step == 0.0:
+            shift = 16 * max(shift, FIRST_SHIFT)
+            if shift > LARGEST_SHIFT:
+                break
+            continue
+        q = q + step * direction
+        shift = max(LEAST_SHIFT, shift / 8) if step == 1.0 else (shift if step >= 0.25 else 4 * shift)
+    message = f"no equilibrium in {max_iterations} iterations: the largest free force is {residual:.3g} N"
+    raise ConvergenceError(f"{message}, {tolerance:.3g} N was asked for", np.array(history))
+
+
+def _positive_shift(
+    system: _System, solver: LinearSolver, shift: float, history: list[tuple[float, float, float, float]]
+) -> tuple[float, Solve]:
+    """The first shift from `shift` upwards for which the tangent is positive definite, and its factor."""
+    while shift <= LARGEST_SHIFT:
+        solve = system.factor(solver, shift)
+        if solve is not None:
+            return shift, solve
+        shift = max(4 * shift, FIRST_SHIFT)
+    raise ConvergenceError("the tangent stays indefinite under any shift", np.array(history))
+
+
+def _search(system: _System, q: Floats, direction: Floats, energy: float, slope: float) -> float:
+    """Step length in {1, 1/2, 1/4, ...} that lowers the potential enough; 0 if none does."""
+    step = 1.0
+    for _ in range(12):
+        trial = system.energy(q + step * direction)
+        if trial <= energy + ARMIJO * step * slope + ROUND_OFF * abs(energy):
+            return step
+        step /= 2
+    return 0.0

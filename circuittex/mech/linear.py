@@ -1,0 +1,141 @@
+"""Direct solvers for the tangent, behind one small interface that also answers "is it positive definite?".
+
+A solver's `factor` takes the pattern and the values of a symmetric matrix and returns a function that
+solves with it, or None where a pivot is not positive. Work that depends on the pattern alone is kept while
+the same `Pattern` object comes back.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import warnings
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+from circuittex.geometry.mesh import Floats, Ints
+from circuittex.mech.pattern import Pattern
+
+Solve = Callable[[Floats], Floats]
+
+
+class LinearSolver(Protocol):
+    """What the equilibrium iteration asks of a solver."""
+
+    name: str
+
+    def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
+        """A function that solves with the matrix, or None if it is not positive definite."""
+
+
+def best_solver() -> LinearSolver:
+    """PARDISO where its wheel is installed (the `fast` extra), else SciPy's SuperLU."""
+    return PardisoSolver() if importlib.util.find_spec("pypardiso") else SuperLUSolver()
+
+
+class SuperLUSolver:
+    """SciPy's SuperLU with diagonal pivots, so that the signs of U's diagonal tell the inertia.
+
+    Its fill-reducing ordering (minimum degree on A + A^T) is computed once for a pattern; later matrices are
+    permuted with it beforehand.
+    """
+
+    name = "superlu"
+
+    def __init__(self) -> None:
+        self._pattern: Pattern | None = None
+        self._order: Ints = np.empty(0, dtype=np.int64)
+        self._source: Ints = np.empty(0, dtype=np.int64)
+        self._full: Any = None
+
+    def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
+        """A function that solves with the matrix, or None if a pivot is not positive."""
+        spec = "NATURAL"
+        if pattern is not self._pattern:
+            self._arrange(pattern, np.arange(pattern.n_dofs))
+            spec = "MMD_AT_PLUS_A"
+        self._full.data = data[self._source]
+        try:
+            lu = splu(
+                self._full, permc_spec=spec, diag_pivot_thresh=0.0, options={"SymmetricMode": True, "Equil": False}
+            )
+        except RuntimeError:  # SuperLU's word for an exactly singular matrix
+            return None
+        order, place = self._order, lu.perm_c
+        if spec != "NATURAL":
+            self._arrange(pattern, np.argsort(place))
+        if not (np.array_equal(lu.perm_r, lu.perm_c) and lu.U.diagonal().min() > 0):
+            return None
+
+        def solve(b: Floats) -> Floats:
+            x = np.empty_like(b)
+            x[order] = lu.solve(b[order])
+            return x
+
+        return solve
+
+    def _arrange(self, pattern: Pattern, order: Ints) -> None:
+        """Prepare the full matrix with rows and columns in the given order, and where its values come from."""
+        n = pattern.n_dofs
+        upper = sp.csr_array((np.arange(pattern.nnz, dtype=np.float64), pattern.indices, pattern.indptr), shape=(n, n))
+        rows, columns = upper.tocoo().coords
+        off = rows != columns
+        place = np.empty(n, dtype=np.int64)
+        place[order] = np.arange(n)
+        source = np.concatenate([np.arange(pattern.nnz), np.flatnonzero(off)])
+        i, j = place[np.concatenate([rows, columns[off]])], place[np.concatenate([columns, rows[off]])]
+        by_column = np.lexsort((i, j))
+        self._source = source[by_column]
+        start = np.searchsorted(j[by_column], np.arange(n + 1))
+        self._full = sp.csc_array(
+            (np.empty(len(source)), i[by_column].astype(np.int32), start.astype(np.int32)), shape=(n, n)
+        )
+        self._pattern, self._order = pattern, order
+
+
+class PardisoSolver:
+    """Intel MKL's PARDISO through pypardiso: Cholesky, its symbolic analysis kept while the pattern holds."""
+
+    name = "pardiso"
+    _CHOLESKY, _ANALYSE, _FACTOR, _SOLVE, _RELEASE = 2, 11, 22, 33, -1
+    _NOT_POSITIVE = -4
+
+    def __init__(self) -> None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # pypardiso warns about its own optional dependencies
+            import pypardiso
+
+        self._error = pypardiso.pardiso_wrapper.PyPardisoError
+        self._pardiso = pypardiso.PyPardisoSolver(mtype=self._CHOLESKY)
+        self._pattern: Pattern | None = None
+        self._matrix: Any = None
+
+    def _call(self, phase: int, b: Floats) -> Floats:
+        self._pardiso.set_phase(phase)
+        return np.asarray(self._pardiso._call_pardiso(self._matrix, b))
+
+    def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
+        """A function that solves with the matrix (until the next call), or None if it is not positive definite."""
+        nothing = np.zeros(pattern.n_dofs)
+        if pattern is not self._pattern:
+            if self._pattern is not None:
+                self._call(self._RELEASE, np.zeros(self._pattern.n_dofs))
+            shape = (pattern.n_dofs, pattern.n_dofs)
+            self._matrix = sp.csr_matrix((data, pattern.indices, pattern.indptr), shape=shape)
+            self._call(self._ANALYSE, nothing)
+            self._pattern = pattern
+        self._matrix.data = data
+        try:
+            self._call(self._FACTOR, nothing)
+        except self._error as error:
+            if error.value == self._NOT_POSITIVE:
+                return None
+            raise
+        return lambda b: self._call(self._SOLVE, b)
+
+    def __del__(self) -> None:
+        if self._pattern is not None:
+            self._call(self._RELEASE, np.zeros(self._pattern.n_dofs))

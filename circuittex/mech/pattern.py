@@ -1,0 +1,155 @@
+"""The sparsity pattern of the tangent, in node blocks: upper triangle, compressed rows.
+
+Two kinds of node pairs are coupled: *full* pairs (the nodes of an element; all 9 x 9 unknowns) and
+*point* pairs (contact; only the 3 x 3 positions). Within a row the unknowns of one node are contiguous, so
+a block is located by one search among the neighbours of its node.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from circuittex.frozen import frozen
+from circuittex.geometry.mesh import Floats, Ints
+from circuittex.mech.space import DOFS
+
+
+@frozen
+class Pattern:
+    """Upper triangular CSR pattern over n slots of nine unknowns each."""
+
+    indptr: Ints
+    """(9 n + 1,) row starts."""
+    indices: Ints
+    """(nnz,) column numbers, sorted in each row; the diagonal comes first."""
+    neighbour_start: Ints
+    """(n + 1,) offsets into `neighbour`."""
+    neighbour: Ints
+    """neighbours b > a of each slot a, sorted."""
+    point_offset: Ints
+    """per neighbour: where its columns start in the rows of a's position, after a's own diagonal block."""
+    full_offset: Ints
+    """per neighbour: the same in the rows of a's directors; -1 for a point pair."""
+
+    @property
+    def n_dofs(self) -> int:
+        return len(self.indptr) - 1
+
+    @property
+    def nnz(self) -> int:
+        return len(self.indices)
+
+
+def build_pattern(n: int, full: Ints, point: Ints) -> Pattern:
+    """The pattern of `n` slots with `full` (P, 2) and `point` (P', 2) node pairs, in any order, repeats allowed."""
+    pairs = np.sort(np.concatenate([full, point]), axis=1)
+    key = pairs[:, 0] * n + pairs[:, 1]
+    is_full = np.arange(len(key)) < len(full)
+    proper = pairs[:, 0] < pairs[:, 1]
+    unique, first = np.unique(key[proper], return_index=True)
+    full_pair = is_full[proper][first]  # np.unique keeps the first of equals, and full pairs come first
+    a, b = unique // n, unique % n
+    start = np.searchsorted(a, np.arange(n + 1))
+    point_offset = _offsets(np.where(full_pair, DOFS, 3), start)
+    full_offset = np.where(full_pair, _offsets(np.where(full_pair, DOFS, 0), start), -1)
+
+    own = np.arange(DOFS, 0, -1)
+    point_width = np.add.reduceat(np.append(np.where(full_pair, DOFS, 3), 0), start[:-1]) * (np.diff(start) > 0)
+    full_width = np.add.reduceat(np.append(np.where(full_pair, DOFS, 0), 0), start[:-1]) * (np.diff(start) > 0)
+    length = own[None, :] + np.where(np.arange(DOFS)[None, :] < 3, point_width[:, None], full_width[:, None])
+    indptr = np.concatenate([[0], np.cumsum(length.ravel())])
+    indices = np.empty(indptr[-1], dtype=np.int64)
+    _fill_indices(indptr, start, b, full_pair, indices)
+    return Pattern(
+        indptr=indptr,
+        indices=indices,
+        neighbour_start=start,
+        neighbour=b,
+        point_offset=point_offset,
+        full_offset=full_offset,
+    )
+
+
+def _offsets(width: Ints, start: Ints) -> Ints:
+    """Exclusive running sum of `width`, restarted at each slot."""
+    total = np.concatenate([[0], np.cumsum(width)])
+    return total[:-1] - np.repeat(total[start[:-1]], np.diff(start))
+
+
+@njit(cache=True, nogil=True)
+def _fill_indices(indptr: Any, start: Any, neighbour: Any, full: Any, indices: Any) -> None:
+    for a in range(start.shape[0] - 1):
+        for k in range(9):
+            at = indptr[9 * a + k]
+            for col in range(9 * a + k, 9 * a + 9):
+                indices[at] = col
+                at += 1
+            for i in range(start[a], start[a + 1]):
+                width = 9 if full[i] else (3 if k < 3 else 0)
+                for col in range(9 * neighbour[i], 9 * neighbour[i] + width):
+                    indices[at] = col
+                    at += 1
+
+
+@njit(cache=True, nogil=True)
+def find_neighbour(start: Any, neighbour: Any, a: int, b: int) -> int:
+    """Index of slot b among the neighbours of slot a < b, by bisection."""
+    low, high = start[a], start[a + 1]
+    while high - low > 1:
+        middle = (low + high) // 2
+        if neighbour[middle] <= b:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@njit(cache=True, nogil=True)
+def add_elements(
+    slots: Any,
+    gradient: Any,
+    tangent: Any,
+    indptr: Any,
+    start: Any,
+    neighbour: Any,
+    point_offset: Any,
+    full_offset: Any,
+    total: Any,
+    data: Any,
+) -> None:
+    """Add element gradients (M, n, 9) and tangents (M, n, 9, n, 9) to the vector and the matrix values."""
+    nodes = slots.shape[1]
+    for e in range(slots.shape[0]):
+        for i in range(nodes):
+            a = slots[e, i]
+            for k in range(9):
+                total[9 * a + k] += gradient[e, i, k]
+                at = indptr[9 * a + k]
+                for m in range(k, 9):
+                    data[at + m - k] += tangent[e, i, k, i, m]
+            for j in range(i + 1, nodes):
+                b = slots[e, j]
+                low, high = min(a, b), max(a, b)
+                n = find_neighbour(start, neighbour, low, high)
+                for k in range(9):
+                    offset = point_offset[n] if k < 3 else full_offset[n]
+                    at = indptr[9 * low + k] + 9 - k + offset
+                    for m in range(9):
+                        data[at + m] += tangent[e, i, k, j, m] if a < b else tangent[e, i, m, j, k]
+
+
+def diagonal(pattern: Pattern) -> Ints:
+    """Positions of the diagonal entries."""
+    return pattern.indptr[:-1]
+
+
+def multiply(pattern: Pattern, data: Floats, x: Floats) -> Floats:
+    """The symmetric matrix with upper triangle `data` times x."""
+    import scipy.sparse as sp
+
+    upper = sp.csr_array((data, pattern.indices, pattern.indptr), shape=(pattern.n_dofs, pattern.n_dofs))
+    product: Floats = upper @ x + upper.T @ x - data[diagonal(pattern)] * x
+    return product

@@ -1,0 +1,106 @@
+"""The finite element space of the beams: scikit-fem's mesh, basis, quadrature and dof numbering."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import skfem
+
+from circuittex.frozen import frozen
+from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
+from circuittex.mech.configuration import Configuration
+
+DOFS = 9
+"""Unknowns of a node: r, g1, g2."""
+
+
+@frozen
+class BeamSpace:
+    """What the beam kernels need of scikit-fem's basis; M elements of n nodes, Q line points.
+
+    Unknowns are numbered by scikit-fem. The nine of one node are contiguous, so its number there, its
+    *slot*, says it all: unknown k of node i is ``9 * slot[i] + k``.
+    """
+
+    mesh: FibrilMesh
+    slot: Ints
+    """(N,) scikit-fem's number of each node."""
+    element_slots: Ints
+    """(M, n) slots of each element's nodes, in axis order."""
+    shape: Floats
+    """(Q, n) shape functions at the line points."""
+    slope: Floats
+    """(M, Q, n) their derivatives with respect to xi3, 1/mm."""
+    weight: Floats
+    """(M, Q) line weights, mm."""
+    mass_line: Floats
+    """(M, n, n) integrals of products of shape functions, mm."""
+    fixed: Ints
+    """prescribed unknowns: r of every fibril end [49]; the directors are free [50, 51]."""
+
+    @property
+    def n_dofs(self) -> int:
+        return DOFS * self.mesh.n_nodes
+
+    def vector(self, configuration: Configuration) -> Floats:
+        """(n_dofs,) unknowns of a configuration, in scikit-fem's numbering."""
+        q = np.empty((self.mesh.n_nodes, DOFS))
+        q[self.slot] = configuration.x.reshape(-1, DOFS)
+        return q.ravel()
+
+    def configuration(self, vector: Floats) -> Configuration:
+        """The configuration that a vector of unknowns describes."""
+        return Configuration(vector.reshape(-1, 3, 3)[self.slot])
+
+
+def line_mesh(mesh: FibrilMesh) -> Any:
+    """scikit-fem's mesh of all fibrils, each on its own [0, L]: offset meshes would cost digits."""
+    vertices, index = np.unique(mesh.elements[:, [0, -1]], return_inverse=True)
+    cells = np.ascontiguousarray(index.reshape(-1, 2).T)
+    return skfem.MeshLine1(mesh.xi[vertices][None, :], cells, sort_t=False)
+
+
+def vector_basis(mesh: FibrilMesh) -> Any:
+    """scikit-fem's basis of the nine unknowns: linear elements with one point, quadratic with two.
+
+    Both are the reduced rules that do not lock in bending (see `docs/numerics.md`).
+    """
+    element = {1: skfem.ElementLineP1, 2: skfem.ElementLineP2}[mesh.order]()
+    return skfem.Basis(line_mesh(mesh), skfem.ElementVector(element, DOFS), quadrature=gauss(mesh.order))
+
+
+def gauss(points: int) -> tuple[Floats, Floats]:
+    """Gauss rule on [0, 1] in scikit-fem's form: points (1, Q), weights (Q,)."""
+    t, w = np.polynomial.legendre.leggauss(points)
+    return (t[None, :] + 1) / 2, w / 2
+
+
+def beam_space(mesh: FibrilMesh) -> BeamSpace:
+    """The space for a mesh, with every fibril end's position prescribed."""
+    basis = vector_basis(mesh)
+    scalar = skfem.Basis(basis.mesh, type(basis.elem.elem)(), quadrature=gauss(mesh.order))
+    exact = skfem.Basis(basis.mesh, type(basis.elem.elem)(), quadrature=gauss(mesh.order + 1))
+    axis_order = [0, 1] if mesh.order == 1 else [0, 2, 1]  # scikit-fem numbers the middle node last
+
+    def tables(of: Any) -> tuple[Floats, Floats]:
+        value = np.stack([np.broadcast_to(of.basis[i][0].value, of.dx.shape) for i in axis_order], axis=-1)
+        grad = np.stack([of.basis[i][0].grad[0] for i in axis_order], axis=-1)
+        return value, grad
+
+    shape, slope = tables(scalar)
+    exact_shape, _ = tables(exact)
+    local = np.asarray(basis.element_dofs)[::DOFS].T[:, axis_order] // DOFS
+    slot = np.empty(mesh.n_nodes, dtype=np.int64)
+    slot[mesh.elements] = local
+    ends = np.concatenate([mesh.end_nodes(-1), mesh.end_nodes(+1)])
+    return BeamSpace(
+        mesh=mesh,
+        slot=slot,
+        element_slots=slot[mesh.elements],
+        shape=shape[0],
+        slope=slope,
+        weight=np.asarray(scalar.dx),
+        mass_line=np.einsum("mqa,mqb,mq->mab", exact_shape, exact_shape, exact.dx),
+        fixed=np.sort((DOFS * slot[ends][:, None] + np.arange(3)).ravel()),
+    )

@@ -1,0 +1,24 @@
+"""The protocol by which forces enter the equilibrium: the only place where mechanics and contact meet."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from circuittex.geometry.mesh import Floats, Ints
+from circuittex.mech.pattern import Pattern
+
+
+class ForceTerm(Protocol):
+    """A potential of the unknowns q (n_dofs,), with its gradient and exact tangent."""
+
+    def prepare(self, q: Floats) -> bool:
+        """Make the term valid around q; True if the node pairs it couples have changed."""
+
+    def pairs(self) -> tuple[Ints, Ints]:
+        """Coupled slots: full pairs (P, 2) with all nine unknowns, point pairs (P', 2) with the positions."""
+
+    def energy(self, q: Floats) -> float:
+        """The potential, N mm; infinite where q is impossible."""
+
+    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats) -> float:
+        """Add the gradient (N) and the tangent's upper triangle (N/mm) in place; return the potential."""

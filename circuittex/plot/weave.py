@@ -1,0 +1,132 @@
+"""The deformed weave in three dimensions, coloured by force, current or temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from circuittex import tubes
+from circuittex.fields import Fields
+from circuittex.frozen import frozen
+from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.plot.scene import Camera, camera, draw_tubes
+from circuittex.plot.style import GREY, bare, new_figure, style
+from circuittex.results import Record, Study
+
+VIEW = (-62.0, 38.0)
+"""Azimuth and elevation of the single cell, degrees."""
+PROBE_VIEW = (-75.0, 58.0)
+
+
+@frozen
+class _Scale:
+    """What a colour bar says; `low` is the value of its lower end, the upper end is the largest value."""
+
+    label: str
+    unit: str
+    colours: str
+    low: float
+
+
+def cell_figure(study: Study, record: Record) -> Figure:
+    """The cell of one state as tubes coloured by the magnitude of the section force |∫ P E3 dA|, N."""
+    with style():
+        figure = new_figure(7.2, 5.0)
+        axes = figure.add_subplot()
+        values = record.section_force[tubes.span_element(study.mesh)]
+        view = camera(*VIEW)
+        scale = _Scale("section force", "N", "viridis", float(values.min()))
+        _draw(axes, study.mesh, record.configuration.x, values, scale, view, 16)
+        _axes_triad(axes, view, record.configuration.r)
+        axes.set_title(f"{record.name}: section force")
+    return figure
+
+
+def probe_figure(study: Study, record: Record, quantity: str) -> Figure:
+    """The `quantity` ('current' or 'temperature') of every probe of one state, each on a scale of its own.
+
+    The current is the mean of its magnitude over the piece between two mesh nodes of one fibril. A plus marks the
+    probe's source, a minus its sink.
+    """
+    label, unit, colours, value = _QUANTITIES[quantity]
+    scale = _Scale(label, unit, colours, 0.0)
+    with style():
+        figure = new_figure(3.6 * len(record.fields), 3.9)
+        # The layout counts the height of one line of a title above axes of a fixed aspect; these have two.
+        figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 0.94))
+        for number, fields in enumerate(record.fields):
+            axes = figure.add_subplot(1, len(record.fields), number + 1)
+            view = camera(*PROBE_VIEW)
+            axes.margins(0.13)
+            _draw(axes, study.mesh, record.configuration.x, value(study.mesh, fields), scale, view, 12)
+            _mark_terminals(axes, study, record, fields, view)
+            axes.set_title(f"{record.name}, probe {fields.probe}\n{fields.currents[0]:.4g} A at {fields.voltage:g} V")
+    return figure
+
+
+def _current(mesh: FibrilMesh, fields: Fields) -> Floats:
+    return np.abs(tubes.span_current(mesh, fields))
+
+
+def _temperature(mesh: FibrilMesh, fields: Fields) -> Floats:
+    mean: Floats = tubes.at_nodes(mesh, fields, fields.temperature)[tubes.spans(mesh)].mean(axis=1)
+    return mean
+
+
+_QUANTITIES: dict[str, tuple[str, str, str, Callable[[FibrilMesh, Fields], Floats]]] = {
+    "current": ("|current| in a fibril", "A", "cividis", _current),
+    "temperature": ("temperature rise", "K", "plasma", _temperature),
+}
+_PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+
+
+def _draw(axes: Axes, mesh: FibrilMesh, x: Floats, values: Floats, scale: _Scale, view: Camera, sides: int) -> None:
+    """Tubes with a colour bar in a unit of the size of the values."""
+    largest = float(np.nanmax(np.abs(values), initial=0.0))
+    unit, prefix = next((pair for pair in _PREFIXES if largest >= pair[0]), (1.0, ""))
+    low, high = scale.low / unit, largest / unit
+    colours = ScalarMappable(Normalize(low, high if high > low else low + 1.0), scale.colours)
+    bare(axes)
+    draw_tubes(axes, mesh, x, values / unit, colours, view, sides)
+    figure = axes.figure
+    assert isinstance(figure, Figure)
+    bar = figure.colorbar(colours, ax=axes, orientation="horizontal", shrink=0.6, aspect=30, pad=0.02)
+    bar.set_label(f"{scale.label} ({prefix}{scale.unit})")
+
+
+def _axes_triad(axes: Axes, view: Camera, r: Floats) -> None:
+    """Arrows of 1 mm along x, y and z in the corner of the picture."""
+    low = view.project(r).min(axis=0)
+    for direction, name in zip(view.project(np.eye(3)), "xyz", strict=True):
+        tip = low[:2] + direction[:2]
+        arrow = {"arrowstyle": "-|>", "color": GREY, "shrinkA": 0, "shrinkB": 0}
+        axes.annotate("", tip, low[:2], arrowprops=arrow)
+        right, up = low[:2] + 1.25 * direction[:2]
+        axes.text(right, up, name, ha="center", va="center", color=GREY)
+    axes.text(low[0], low[1] - 0.15, "1 mm", ha="center", va="top", color=GREY, fontsize=8)
+
+
+def _mark_terminals(axes: Axes, study: Study, record: Record, fields: Fields, view: Camera) -> None:
+    mesh, seen = study.mesh, view.project(record.configuration.r)
+    ends = {terminal.name: terminal.ends for terminal in study.design.terminals}
+    middle = seen.mean(axis=0)
+    for name, sign, colour in zip(fields.terminals, "+−", ("#d55e00", "#0072b2"), strict=True):
+        for yarn, side in ends[name]:
+            nodes = mesh.end_nodes(side)[mesh.yarn == mesh.yarn_names.index(yarn)]
+            place = seen[nodes].mean(axis=0)
+            place += 0.9 * (place - middle) / np.linalg.norm((place - middle)[:2])
+            axes.text(
+                place[0],
+                place[1],
+                sign,
+                ha="center",
+                va="center",
+                color="white",
+                fontweight="bold",
+                bbox={"boxstyle": "circle,pad=0.2", "facecolor": colour, "edgecolor": "none"},
+            )

@@ -1,0 +1,221 @@
+"""report.html: one self-contained page with the figures and numbers of a study."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from html import escape
+from pathlib import Path
+from string import Template
+
+import numpy as np
+
+from circuittex.plot import save_figures
+from circuittex.report.frame import PAGE
+from circuittex.results import Record, Study
+from circuittex.summary import difference, insulated_resistance, ngspice_statement
+
+REQUIRED = 1e-9
+"""Largest difference between two routes that counts as agreement."""
+
+_CAPTIONS = {
+    "cell": "The relaxed cell. Colour: magnitude of the force a fibril's section carries.",
+    "section": "A centre yarn before and after relaxation, cut across at a crossing (left) and along (right): do the "
+    "rows of fibrils (filled circles) settle into fewer levels?",
+    "currents": "Current along the fibrils in the last recorded state, one picture for each probe, each on its own "
+    "scale. Plus marks the source, minus the sink.",
+    "temperatures": "Temperature rise from Joule heating in the last recorded state, each probe on its own scale.",
+    "forces": "Total force of the clamps on the +x ends of the warp and on the +y ends of the weft, by component.",
+    "probes": "Current of each probe against strain.",
+    "network": "The reduced network: resistance Ry of a yarn segment between two crossings (dashed: the same yarn "
+    "without any contacts) and Rc of a crossing.",
+    "verification": "Largest differences between the independent routes to the same voltages and currents, and what "
+    "merging contacts and the finite-element mesh change.",
+}
+
+
+def write_report(folder: str | Path, study: Study) -> Path:
+    """Draw the figures into ``folder/figures`` and write ``folder/report.html``; returns its path.
+
+    The page holds its pictures itself and loads nothing; a study without records gives a page that says so.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    pictures = save_figures(study, folder / "figures") if study.records else {}
+    path = folder / "report.html"
+    path.write_text(page(study, {name: file.read_bytes() for name, file in pictures.items()}), encoding="utf-8")
+    return path
+
+
+def page(study: Study, pictures: Mapping[str, bytes]) -> str:
+    """The whole page as text; `pictures` are PNG files by the names of `circuittex.plot.FIGURES`."""
+    shown = {f"figure_{name}": _figure(name, pictures.get(name)) for name in _CAPTIONS}
+    return Template(PAGE).substitute(
+        shown,
+        title=escape(study.design.name),
+        facts=_facts(study),
+        verdict=_verdict(study),
+        states=_states(study),
+        network=_network(study),
+        verification=_verification(study),
+        parameters=_parameters(study),
+        version=escape(study.version),
+    )
+
+
+def _figure(name: str, png: bytes | None) -> str:
+    if png is None:
+        return ""
+    data = base64.b64encode(png).decode("ascii")
+    caption = escape(_CAPTIONS[name])
+    image = f'<img alt="{caption}" src="data:image/png;base64,{data}">'
+    return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """An HTML table; the first column names the row. All texts are escaped here."""
+    top = "".join(f'<th scope="col">{escape(text)}</th>' for text in head)
+    body = "".join(
+        f'<tr><th scope="row">{escape(row[0])}</th>' + "".join(f"<td>{escape(text)}</td>" for text in row[1:]) + "</tr>"
+        for row in rows
+    )
+    return f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def _number(value: float, digits: int = 4) -> str:
+    return f"{value:.{digits}g}" if value == value else "–"
+
+
+def _facts(study: Study) -> str:
+    mesh = study.mesh
+    facts = {
+        "Design": study.design.name,
+        "Design hash": study.design_hash,
+        "circuittex": study.version,
+        "Fibrils": f"{mesh.n_fibrils} in {len(mesh.yarn_names)} yarns",
+        "Mesh": f"{mesh.n_nodes} nodes, {len(mesh.elements)} elements of order {mesh.order}",
+        "Recorded states": str(len(study.records)),
+    }
+    if study.records:
+        facts["Contact points"] = f"{study.records[0].contacts.n_contacts} in state {study.records[0].name}"
+    return "<dl>" + "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in facts.items()) + "</dl>"
+
+
+def _verdict(study: Study) -> str:
+    """Whether the routes agree and ngspice took part, as a box that cannot be overlooked."""
+    if not study.records:
+        return '<p class="bad">No state has been recorded: there are no results yet.</p>'
+    worst = float(np.max([difference(record) for record in study.records]))  # nan if any is: that is no agreement
+    agree = worst <= REQUIRED
+    checked = all(record.verification.ngspice_checked for record in study.records)
+    sentences = [
+        f"The routes to every node voltage and probe current {'agree' if agree else 'DISAGREE'}: the largest "
+        f"difference in any state is {worst:.1e} (at most {REQUIRED:.0e} is required).",
+        *ngspice_statement(study),
+    ]
+    kind = "good" if agree and checked else "bad"
+    return f'<div class="{kind}">' + "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences) + "</div>"
+
+
+def _states(study: Study) -> str:
+    probes = [f"I {probe.name} (A)" for probe in study.design.probes]
+    head = ["state", "strain", *probes, "peak temperature rise (K)"]
+    rows = [
+        [
+            record.name,
+            _number(record.strain),
+            *map(_number, record.currents),
+            _number(record.peak_temperature),
+        ]
+        for record in study.records
+    ]
+    return (
+        f"{_table(head, rows)}<h3>Clamp forces</h3>{_forces(study)}<h3>Equilibrium</h3>{_equilibrium(study)}"
+        if rows
+        else "<p>No state has been recorded.</p>"
+    )
+
+
+def _forces(study: Study) -> str:
+    head = ["state", *(f"{side} F{axis} (N)" for side in ("warp +x", "weft +y") for axis in "xyz")]
+    return _table(head, [[r.name, *(f"{force:.4f}" for force in r.clamp_force.ravel())] for r in study.records])
+
+
+def _equilibrium(study: Study) -> str:
+    head = ["state", "largest free force (N)", "Newton iterations", "contact points", "netlist"]
+    rows = [
+        [r.name, f"{r.residual:.1e}", str(r.iterations), str(r.contacts.n_contacts), r.netlist] for r in study.records
+    ]
+    return _table(head, rows)
+
+
+def _network(study: Study) -> str:
+    if not study.records:
+        return ""
+    rows = [
+        [r.name, _number(r.fit.Ry), _number(r.fit.Rc), f"{r.fit.residual:.2e}", "; ".join(r.fit.warnings) or "none"]
+        for r in study.records
+    ]
+    table = _table(["state", "Ry (Ω)", "Rc (Ω)", "misfit", "warnings"], rows)
+    weighting = escape(study.records[0].fit.weighting)
+    insulated = _number(insulated_resistance(study.mesh))
+    return f"{table}<p>Weighting of the fit: {weighting}. Ry of the same yarns without contacts: {insulated} Ω.</p>"
+
+
+def _verification(study: Study) -> str:
+    if not study.records:
+        return ""
+    head = ["state", "routes", "voltages (V per V)", "currents (relative)"]
+    head += ["merging", "mechanical mesh", "ngspice", "time (s)"]
+    return _table(head, [_verification_row(record) for record in study.records])
+
+
+def _verification_row(record: Record) -> list[str]:
+    check = record.verification
+    return [
+        record.name,
+        ", ".join(check.routes),
+        f"{check.max_voltage_difference:.1e}",
+        f"{check.max_current_difference:.1e}",
+        _number(check.merge_error, 2),
+        _number(check.field_difference, 2),
+        "checked" if check.ngspice_checked else f"NOT CHECKED {check.note}".strip(),
+        f"{check.fields_seconds + check.nodal_seconds + check.ngspice_seconds:.2g}",
+    ]
+
+
+def _parameters(study: Study) -> str:
+    design, weave = study.design, study.design.weave
+    yarns = dict.fromkeys(weave.warp + weave.weft)
+    materials = dict.fromkeys(material for yarn in yarns for material in yarn.materials)
+    parts = [
+        _settings("Weave", weave, skip=("draft", "warp", "weft")),
+        "<h3>Draft</h3><pre>" + "\n".join(" ".join("■" if over else "□" for over in row) for row in weave.draft[::-1]),
+        "</pre><p>A row is a warp yarn (the last at the top), a column a weft yarn; ■: the warp passes over.</p>",
+        *(_settings(f"Yarn {yarn.name}", yarn, skip=("name", "materials")) for yarn in yarns),
+        *(_settings(f"Material {material.name}", material, skip=("name",)) for material in materials),
+        _settings("Contact", design.contact),
+        _settings("Electrical", design.electrical),
+        _settings("Numerics", design.numerics),
+        "<h3>Probes</h3>",
+        _table(
+            ["probe", "source", "sink", "voltage (V)"],
+            [[p.name, _ends(study, p.source), _ends(study, p.sink), _number(p.voltage)] for p in design.probes],
+        ),
+    ]
+    return "".join(parts)
+
+
+def _ends(study: Study, name: str) -> str:
+    ends = next(terminal.ends for terminal in study.design.terminals if terminal.name == name)
+    return f"{name} ({', '.join(yarn + ('+' if side > 0 else '-') for yarn, side in ends)})"
+
+
+def _settings(title: str, part: object, skip: Sequence[str] = ()) -> str:
+    rows = [
+        [field.name.replace("_", " "), str(getattr(part, field.name))]
+        for field in fields(part)  # type: ignore[arg-type]
+        if field.name not in skip
+    ]
+    return f"<h3>{escape(title)}</h3>{_table(['setting', 'value in base units'], rows)}"

@@ -1,0 +1,79 @@
+"""The results of a study: one `Record` for each recorded state, and the `Study` that holds them."""
+
+from __future__ import annotations
+
+from circuittex.contact.state import ContactState
+from circuittex.design import Design
+from circuittex.fields import Fields
+from circuittex.fit import Fit
+from circuittex.frozen import frozen
+from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.mech.configuration import Configuration
+from circuittex.verify import Verification
+
+
+@frozen
+class Record:
+    """Everything that is kept of one recorded equilibrium."""
+
+    name: str
+    """For example 'relaxed' or 'stretch-0.0500'."""
+    path: str
+    """Name of the loading path; empty for the relaxed state."""
+    strain: float
+    """The strain that labels the state."""
+    gradient: Floats
+    """(2, 2) average in-plane deformation gradient from the relaxed state."""
+    configuration: Configuration
+    """Centre lines and directors at equilibrium."""
+    residual: float
+    """Largest free-dof force, N."""
+    iterations: int
+    """Newton iterations spent on this state."""
+    history: Floats
+    """(n, 4) per iteration: residual N, energy N mm, shift 1/s2, step length."""
+    clamp_force: Floats
+    """(2, 3) total force of the clamps on the +x ends of the warp and the +y ends of the weft, N [40, 41]."""
+    section_force: Floats
+    """(M,) magnitude of the section force |∫ P E3 dA| in each element, N."""
+    contacts: ContactState
+    """The contact state at full resolution."""
+    fields: tuple[Fields, ...]
+    """Potential and temperature for each probe, at full resolution."""
+    fit: Fit
+    """Reduced network fitted to the probe currents."""
+    reduced_difference: float
+    """Largest relative difference of the reduced network's probe currents between the fit and ngspice; nan where
+    ngspice did not check it."""
+    verification: Verification
+    """How the routes to the currents and voltages agree."""
+    netlist: str
+    """Path of the detailed sub-circuit, relative to the results folder."""
+
+    @property
+    def currents(self) -> tuple[float, ...]:
+        """Current of each probe into its source terminal, A."""
+        return tuple(float(f.currents[0]) for f in self.fields)
+
+    @property
+    def peak_temperature(self) -> float:
+        """Largest temperature rise over all probes, K."""
+        return max((f.peak_temperature for f in self.fields), default=float("nan"))
+
+
+@frozen
+class Study:
+    """A design and the states recorded for it."""
+
+    version: str
+    """Version of circuittex that computed it."""
+    design: Design
+    """What was computed."""
+    design_hash: str
+    """Hash of the design, as written in the netlists."""
+    mesh: FibrilMesh
+    """The fibrils."""
+    initial: Configuration
+    """The configuration before the first relaxation."""
+    records: tuple[Record, ...]
+    """The recorded states in the order of their computation."""

@@ -1,0 +1,56 @@
+"""Names that every SPICE dialect reads as one word, whatever text they came from."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+_SAFE = re.compile(r"[a-z][a-z0-9_]*")
+_UNSAFE_RUN = re.compile(r"[^a-z0-9]+")
+# Ground has several names, and a node called like one of these would silently be grounded.
+_RESERVED = frozenset({"gnd", "ground"})
+# PySpice and some simulators have line buffers: nobody needs longer words.
+_LONGEST = 80
+
+
+def safe_name(text: str) -> str:
+    """Return `text` as a word of lower-case ASCII letters, digits and underscores that starts with a letter.
+
+    A last '-' or '+' names a yarn end and is spelt out; every other run of odd characters becomes one underscore.
+
+    >>> safe_name("warp2-"), safe_name("Weft 1\\n.end;$*"), safe_name("2"), safe_name("gnd")
+    ('warp2_minus', 'weft_1_end', 'n_2', 'n_gnd')
+    """
+    if _SAFE.fullmatch(text) and text not in _RESERVED and len(text) <= _LONGEST:
+        return text
+    word = text.lower()
+    if word.endswith(("-", "+")):
+        word = f"{word[:-1]}_{'minus' if word[-1] == '-' else 'plus'}"
+    word = _UNSAFE_RUN.sub("_", word).strip("_")[:_LONGEST].rstrip("_")
+    return word if word and word[0].isalpha() and word not in _RESERVED else f"n_{word}".rstrip("_")
+
+
+def unique_names(names: Iterable[str]) -> tuple[str, ...]:
+    """Return the safe form of each name, a repeated one with the first free number behind it.
+
+    The result depends on the names and their order alone, and safe names that do not repeat come back unchanged.
+
+    >>> unique_names(["a", "A", "a_2", "b"])
+    ('a', 'a_3', 'a_2', 'b')
+    """
+    words = [safe_name(name) for name in names]
+    taken = set(words)
+    if len(taken) == len(words):
+        return tuple(words)
+    seen: set[str] = set()
+    next_number: dict[str, int] = {}
+    for i, word in enumerate(words):
+        if word in seen:
+            number = next_number.get(word, 2)
+            while f"{word}_{number}" in taken:
+                number += 1
+            next_number[word] = number + 1
+            words[i] = f"{word}_{number}"
+            taken.add(words[i])
+        seen.add(words[i])
+    return tuple(words)

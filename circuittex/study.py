@@ -1,0 +1,168 @@
+"""Algorithm 1: relax, then move and relax along every loading path, and record each state."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from circuittex import __version__
+from circuittex.contact.extract import contact_state
+from circuittex.design import Design, design_hash
+from circuittex.export import simplified, write_netlists
+from circuittex.fields import solve_probes
+from circuittex.fit import fit_network
+from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.geometry.weave import build_mesh
+from circuittex.mech.configuration import initial_configuration
+from circuittex.mech.linear import LinearSolver, best_solver
+from circuittex.relax import Equilibrium, clamp_force, move, relax
+from circuittex.report import write_report
+from circuittex.results import Record, Study
+from circuittex.store import append_record, write_study_start
+from circuittex.summary import write_summary
+from circuittex.verify import verify
+from circuittex.verify_reduced import verify_reduced
+from circuittex.vtu import write_collections, write_vtu
+
+RESULTS = "results.h5"
+"""Name of the HDF5 file in the output folder."""
+
+
+def run_study(
+    design: Design,
+    out: str | Path | None = None,
+    *,
+    solver: LinearSolver | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Study:
+    """Compute a design: the relaxed state and every state of its loading paths.
+
+    With `out`, everything is left in that folder: the HDF5 file grows state by state, so what an interrupted
+    run has completed is kept; netlists and VTU files are written with each state, summary, figures and report
+    at the end. `progress` is told in words what is being done.
+
+    Raises `ConvergenceError` where an equilibrium is not found.
+    """
+    say = progress if progress is not None else _say_nothing
+    mesh = build_mesh(design)
+    folder = None if out is None else Path(out)
+    study = Study(
+        version=__version__,
+        design=design,
+        design_hash=design_hash(design),
+        mesh=mesh,
+        initial=initial_configuration(mesh),
+        records=(),
+    )
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_study_start(folder / RESULTS, study)
+    for name, path, strain, gradient, equilibrium in _states(study, solver or best_solver(), say):
+        say(f"{name}: fields, netlists and verification")
+        record = record_state(study, name, path, strain, gradient, equilibrium, folder)
+        study = replace(study, records=(*study.records, record))
+        if folder is not None:
+            append_record(folder / RESULTS, record)
+            write_vtu(_made(folder / "vtu") / f"{name}.vtu", mesh, record)
+            write_summary(folder / "summary.json", study)
+    if folder is not None:
+        say("figures and report")
+        write_collections(folder / "vtu", study.records)
+        write_report(folder, study)
+    return study
+
+
+def record_state(
+    study: Study,
+    name: str,
+    path: str,
+    strain: float,
+    gradient: Floats,
+    equilibrium: Equilibrium,
+    folder: Path | None = None,
+) -> Record:
+    """Contacts, fields, circuit, netlists (with a `folder`), verification and fit of one equilibrium."""
+    design, mesh = study.design, study.mesh
+    contacts = contact_state(
+        mesh,
+        equilibrium.configuration,
+        design.contact,
+        per_element=design.numerics.contact_points,
+        conduction=design.electrical.conduction,
+    )
+    fields = solve_probes(
+        contacts, design.terminals, design.probes, contact_heat=design.electrical.contact_heat
+    )
+    simple = simplified(design, contacts)
+    fit = fit_network([f.currents[0] for f in fields], design)
+    verification = verify(contacts, simple.contacts, design.terminals, design.probes, fields=fields)
+    netlist = ""
+    if folder is not None:
+        netlist = write_netlists(folder / "netlists", design, name, simple, fit).relative_to(folder).as_posix()
+    return Record(
+        name=name,
+        path=path,
+        strain=strain,
+        gradient=gradient,
+        configuration=equilibrium.configuration,
+        residual=equilibrium.residual,
+        iterations=equilibrium.iterations,
+        history=equilibrium.history,
+        clamp_force=clamp_force(mesh, equilibrium.reaction),
+        section_force=np.linalg.norm(equilibrium.section_force, axis=1),
+        contacts=contacts,
+        fields=fields,
+        fit=fit,
+        reduced_difference=verify_reduced(design, fit),
+        verification=verification,
+        netlist=netlist,
+    )
+
+
+def _states(
+    study: Study, solver: LinearSolver, say: Callable[[str], None]
+) -> Iterator[tuple[str, str, float, Floats, Equilibrium]]:
+    """Every state to record, with its equilibrium; each loading path starts from the relaxed state."""
+    design, mesh, rest = study.design, study.mesh, np.eye(2)
+
+    def report(name: str) -> Callable[[int, float], None]:
+        return lambda iteration, residual: say(f"{name}: iteration {iteration}, largest free force {residual:.1e} N")
+
+    relaxed = relax(mesh, design, solver=solver, report=report("relaxed"))
+    yield "relaxed", "", 0.0, rest, relaxed
+    for loading in design.loading:
+        now, before = relaxed, rest
+        names = state_names(loading.name, loading.strains)
+        for name, strain, target in zip(names, loading.strains, loading.gradients, strict=True):
+            after = np.array(target)
+            start = move(now.configuration, before, after)
+            now, before = relax(mesh, design, start, solver=solver, report=report(name)), after
+            yield name, loading.name, strain, after, now
+
+
+def state_names(loading: str, strains: tuple[float, ...]) -> tuple[str, ...]:
+    """A name for each state of a loading path: the path's name and the strain, numbered where a strain recurs.
+
+    >>> state_names("cycle", (0.05, 0.1, 0.05))
+    ('cycle-0.05', 'cycle-0.1', 'cycle-0.05-2')
+    """
+    seen: Counter[str] = Counter()
+    names = []
+    for strain in strains:
+        name = f"{loading}-{strain:.6g}"
+        seen[name] += 1
+        names.append(name if seen[name] == 1 else f"{name}-{seen[name]}")
+    return tuple(names)
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def _say_nothing(_: str) -> None:
+    pass

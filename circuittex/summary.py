@@ -1,0 +1,168 @@
+"""summary.json: the numbers of a study for programs, and the table at the end of a run.
+
+The file is strict JSON; a number that is undefined (nan) or infinite is null. Keys of version 1:
+
+``format``
+    1. A change that would break readers of the file gives a new number; new keys do not.
+``version``, ``design``, ``design_hash``
+    version of circuittex, name of the design, and the hash that also stands in the netlists
+``parameters``
+    the design in full, as nested objects with its field names, in mm, N, MPa, g, S, W, K and V
+``probes``
+    names of the probes, in the order of every list of currents
+``insulated_Ry_ohm``
+    resistance of a yarn segment without contacts [57]
+``states``
+    one object for each recorded state, in the order of computation:
+
+    ``name``, ``path``, ``strain``
+        name of the state, its loading path (empty for the relaxed state), and the strain that labels it
+    ``gradient``
+        2 x 2 average in-plane deformation gradient from the relaxed state
+    ``residual_N``, ``newton_iterations``
+        largest free-dof force at the end, and the iterations this took
+    ``clamp_force_N``
+        ``x``: total force of the clamps on the +x ends of the warp; ``y``: on the +y ends of the weft; three
+        components each [40, 41]
+    ``currents_A``, ``peak_temperature_K``
+        current of each probe, and the largest temperature rise over all probes
+    ``Ry_ohm``, ``Rc_ohm``, ``fit_residual``, ``fit_warnings``
+        the reduced network, its misfit, and what the fit warns of
+    ``contact_points``
+        contact points at full resolution
+    ``netlist``
+        path of the detailed netlist, relative to the folder of the file
+    ``verification``
+        ``routes``: the routes that answered; ``max_voltage_difference_V``: the largest difference of two routes in a
+        node voltage, V per volt of the probe; ``max_current_difference``: in a terminal current, relative;
+        ``merge_error``: largest relative change of a probe current by merging contacts; ``field_difference``: largest
+        relative difference of a probe current between the mechanical mesh and the circuit; ``ngspice_checked``: whether
+        ngspice confirmed the state; ``note``: why it did not
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from circuittex.geometry.mesh import FibrilMesh
+from circuittex.results import Record, Study
+
+FORMAT = 1
+
+
+def summary(study: Study) -> dict[str, Any]:
+    """The content of summary.json, as plain lists, dictionaries, numbers and texts."""
+    content: dict[str, Any] = _plain(
+        {
+            "format": FORMAT,
+            "version": study.version,
+            "design": study.design.name,
+            "design_hash": study.design_hash,
+            "parameters": study.design,
+            "probes": [probe.name for probe in study.design.probes],
+            "insulated_Ry_ohm": insulated_resistance(study.mesh),
+            "states": [_state(record) for record in study.records],
+        }
+    )
+    return content
+
+
+def write_summary(path: str | Path, study: Study) -> None:
+    """Write summary.json."""
+    text = json.dumps(summary(study), indent=2, allow_nan=False, ensure_ascii=False)
+    Path(path).write_text(text + "\n", encoding="utf-8")
+
+
+def table(study: Study) -> str:
+    """The closing table of a run: one line for each state, then whether ngspice confirmed them."""
+    head = ["state", "Fx warp N", "Fy weft N", *(f"{probe.name} A" for probe in study.design.probes)]
+    rows = [[*head, "Ry ohm", "Rc ohm", "routes differ"]]
+    for record in study.records:
+        numbers = [record.clamp_force[0, 0], record.clamp_force[1, 1], *record.currents, record.fit.Ry, record.fit.Rc]
+        rows.append([record.name, *(f"{number:.4g}" for number in numbers), f"{difference(record):.1e}"])
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = [
+        "  ".join([row[0].ljust(widths[0]), *(text.rjust(w) for text, w in zip(row[1:], widths[1:], strict=True))])
+        for row in rows
+    ]
+    return "\n".join([*lines, "", *ngspice_statement(study)])
+
+
+def ngspice_statement(study: Study) -> tuple[str, ...]:
+    """Sentences that say which states ngspice confirmed, and why not the others."""
+    unchecked = [record for record in study.records if not record.verification.ngspice_checked]
+    if not unchecked:
+        return ("ngspice confirmed every recorded state.",)
+    which = "any state" if len(unchecked) == len(study.records) else ", ".join(record.name for record in unchecked)
+    reasons = dict.fromkeys(record.verification.note for record in unchecked if record.verification.note)
+    return (f"ngspice did NOT check {which}: the results rest on circuittex's own solvers.", *reasons)
+
+
+def difference(record: Record) -> float:
+    """The largest difference between two routes, in node voltage per volt or relative current; nan if one is nan."""
+    return float(np.max([record.verification.max_voltage_difference, record.verification.max_current_difference]))
+
+
+def insulated_resistance(mesh: FibrilMesh) -> float:
+    """Ry of a yarn segment between two crossings without contacts [57], ohm; the mean over the conducting yarns.
+
+    A yarn is its fibrils in parallel, Ry = 1 / (n sum sigma A / L), with n crossings along it; inf where none conducts.
+
+    >>> from circuittex.design import plain_weave
+    >>> from circuittex.geometry.weave import build_mesh
+    >>> round(insulated_resistance(build_mesh(plain_weave())), 4)
+    0.2829
+    """
+    conductance = np.bincount(mesh.yarn, mesh.electrical_conductivity * mesh.area / mesh.length, len(mesh.yarn_names))
+    crossings = np.array([np.count_nonzero(mesh.yarn_axis != axis) for axis in mesh.yarn_axis])
+    conducts = conductance > 0.0
+    return float(np.mean(1.0 / (conductance * np.maximum(crossings, 1))[conducts])) if conducts.any() else math.inf
+
+
+def _state(record: Record) -> dict[str, Any]:
+    verification = record.verification
+    return {
+        "name": record.name,
+        "path": record.path,
+        "strain": record.strain,
+        "gradient": record.gradient,
+        "residual_N": record.residual,
+        "newton_iterations": record.iterations,
+        "clamp_force_N": {"x": record.clamp_force[0], "y": record.clamp_force[1]},
+        "currents_A": record.currents,
+        "peak_temperature_K": record.peak_temperature,
+        "Ry_ohm": record.fit.Ry,
+        "Rc_ohm": record.fit.Rc,
+        "fit_residual": record.fit.residual,
+        "fit_warnings": record.fit.warnings,
+        "contact_points": record.contacts.n_contacts,
+        "netlist": record.netlist,
+        "verification": {
+            "routes": verification.routes,
+            "max_voltage_difference_V": verification.max_voltage_difference,
+            "max_current_difference": verification.max_current_difference,
+            "merge_error": verification.merge_error,
+            "field_difference": verification.field_difference,
+            "ngspice_checked": verification.ngspice_checked,
+            "note": verification.note,
+        },
+    }
+
+
+def _plain(value: Any) -> Any:
+    """`value` in the types that JSON knows; undefined and infinite numbers become None."""
+    if is_dataclass(value):
+        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (tuple, list)):
+        return [_plain(item) for item in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return _plain(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,366 @@
+"""The command line: what it prints where, its exit codes, and what it refuses before any long work."""
+
+from __future__ import annotations
+
+import io
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic_study import synthetic_study
+
+import circuittex
+from circuittex.circuit import CONTACT, Circuit
+from circuittex.cli import Progress, main
+from circuittex.design import Design, load_design, starter
+from circuittex.errors import ConvergenceError
+from circuittex.netlist import parse, pin_names
+from circuittex.nodal import NodalSolution, solve_nodal
+from circuittex.results import Study
+from circuittex.store import load_study, write_study_start
+
+COMMANDS = ["new", "run", "netlist", "verify", "report"]
+
+
+@pytest.fixture
+def design_file(tmp_path: Path) -> Path:
+    path = tmp_path / "weave.toml"
+    path.write_text(starter(), encoding="utf-8")
+    return path
+
+
+def error_line(capsys: pytest.CaptureFixture[str]) -> str:
+    """What stderr holds, which must be one line of the agreed form."""
+    text = capsys.readouterr().err
+    assert text.startswith("circuittex: error: ")
+    assert text.count("\n") == 1
+    return text
+
+
+def replace_study(monkeypatch: pytest.MonkeyPatch, function: Callable[..., Study]) -> None:
+    monkeypatch.setattr("circuittex.study.run_study", function)
+
+
+# Help
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_explains_and_shows_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main([command, "--help"])
+    text = capsys.readouterr().out
+    assert stop.value.code == 0
+    assert f"example:\n  circuittex {command} " in text
+    assert len(text.splitlines()) > 6
+
+
+def test_general_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    text = capsys.readouterr().out
+    assert all(f"    {command} " in text for command in COMMANDS)
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(["--version"])
+    assert stop.value.code == 0
+    assert capsys.readouterr().out == f"circuittex {circuittex.__version__}\n"
+
+
+def test_runs_as_a_module() -> None:
+    done = subprocess.run([sys.executable, "-m", "circuittex", "--version"], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (0, f"circuittex {circuittex.__version__}\n")
+
+
+@pytest.mark.parametrize("arguments", [[], ["weave"], ["run"], ["run", "x.toml"], ["netlist", "x", "--kind", "spice"]])
+def test_wrong_usage_is_exit_code_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 2
+    assert "usage: circuittex" in capsys.readouterr().err
+
+
+# new
+
+
+def test_new_prints_a_design_that_loads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["new"]) == 0
+    path = tmp_path / "new.toml"
+    path.write_text(capsys.readouterr().out, encoding="utf-8")
+    assert isinstance(load_design(path), Design)
+    assert "#" in path.read_text(encoding="utf-8")
+
+
+def test_broken_pipe_is_silent() -> None:
+    code = "import sys, circuittex.cli as c; sys.stdin.read(); sys.exit(c.main(['new']))"
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    process.stdout.close()  # the reader goes before a word is written
+    process.stdout = None
+    _, errors = process.communicate("go", timeout=60)
+    assert (process.returncode, errors) == (141, "")
+
+
+# run
+
+
+def test_run_shows_progress_and_ends_with_a_table(
+    design_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = synthetic_study()
+
+    def fake(design: Design, out: Path, *, progress: Callable[[str], None]) -> Study:
+        progress("relaxed: iteration 1")
+        return study
+
+    replace_study(monkeypatch, fake)
+    assert main(["run", str(design_file), "--out", str(tmp_path / "a" / "b")]) == 0
+    shown = capsys.readouterr()
+    assert "relaxed: iteration 1\n" in shown.err
+    lines = shown.out.splitlines()
+    assert all(any(line.startswith(record.name) for line in lines) for record in study.records)
+    assert lines[-1] == f"report: {tmp_path / 'a' / 'b' / 'report.html'}"
+
+
+def test_quiet_run_says_nothing(
+    design_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    replace_study(monkeypatch, lambda design, out, *, progress: (progress("x"), synthetic_study(1))[1])
+    assert main(["run", str(design_file), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_run_refuses_a_file_as_folder(design_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", str(design_file), "--out", str(design_file)]) == 2
+    line = error_line(capsys)
+    assert "results folder" in line
+    assert "a file is in the way" in line
+
+
+def test_run_refuses_a_folder_below_a_file(design_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", str(design_file), "--out", str(design_file / "results")]) == 2
+    assert "a file is in the way" in error_line(capsys)
+
+
+def test_run_refuses_a_folder_that_cannot_be_written(
+    design_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse(**_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("tempfile.TemporaryFile", refuse)
+    assert main(["run", str(design_file), "--out", str(tmp_path)]) == 2
+    assert "Permission denied" in error_line(capsys)
+
+
+def test_unusable_design_leaves_no_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bad = tmp_path / "bad.toml"
+    bad.write_text("nonsense = 1\n", encoding="utf-8")
+    assert main(["run", str(bad), "--out", str(tmp_path / "out")]) == 2
+    assert "nonsense" in error_line(capsys)
+    assert not (tmp_path / "out").exists()
+
+
+def test_missing_design(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "none.toml", "--out", str(tmp_path / "out")]) == 2
+    assert "none.toml" in error_line(capsys)
+
+
+@pytest.mark.parametrize(
+    "error", [ConvergenceError("no equilibrium\nafter 80"), OSError(28, "No space left on device")]
+)
+def test_errors_of_a_study_are_one_line(
+    error: Exception,
+    design_file: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def fail(*_: object, **__: object) -> Study:
+        raise error
+
+    replace_study(monkeypatch, fail)
+    assert main(["run", str(design_file), "--out", str(tmp_path / "out"), "--quiet"]) == 2
+    assert " ".join(str(error).split()) in error_line(capsys)
+
+
+@pytest.mark.parametrize(
+    ("states", "kept"), [(0, "no state"), (1, "1 finished state is"), (2, "2 finished states are")]
+)
+def test_interrupted_run_says_what_it_kept(
+    states: int,
+    kept: str,
+    design_file: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def interrupted(design: Design, out: Path, *, progress: Callable[[str], None]) -> Study:
+        if states:
+            write_study_start(out / "results.h5", synthetic_study(states, contacts=10))
+        raise KeyboardInterrupt
+
+    replace_study(monkeypatch, interrupted)
+    assert main(["run", str(design_file), "--out", str(tmp_path / "out"), "--quiet"]) == 130
+    assert kept in capsys.readouterr().err
+
+
+def test_other_errors_are_not_hidden(design_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A defect of circuittex is not the user's mistake: it keeps its traceback."""
+
+    def broken(*_: object, **__: object) -> Study:
+        raise ZeroDivisionError
+
+    replace_study(monkeypatch, broken)
+    with pytest.raises(ZeroDivisionError):
+        main(["run", str(design_file), "--out", str(tmp_path / "out"), "--quiet"])
+
+
+# Progress
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_progress_is_one_updating_line_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "20")
+    stream = Terminal()
+    with Progress(stream) as progress:
+        progress("first")
+        progress("second " * 10)
+    text = stream.getvalue()
+    assert "\n" not in text
+    assert text.split("\r\x1b[2K") == ["", "first", ("second " * 10)[:19], ""]
+
+
+def test_progress_is_plain_lines_elsewhere() -> None:
+    stream = io.StringIO()
+    with Progress(stream) as progress:
+        progress("first")
+        progress("second")
+    assert stream.getvalue() == "first\nsecond\n"
+
+
+# netlist, verify, report
+
+
+@pytest.fixture(scope="module")
+def computed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A results folder with the HDF5 file only."""
+    folder = tmp_path_factory.mktemp("results")
+    write_study_start(folder / "results.h5", synthetic_study(2, contacts=60, rows=(2,)))
+    return folder
+
+
+@pytest.mark.parametrize("command", ["netlist", "verify", "report"])
+def test_folder_without_results(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, str(tmp_path)]) == 2
+    assert "there is no results file here" in error_line(capsys)
+
+
+@pytest.mark.parametrize("command", ["netlist", "verify"])
+def test_unknown_state_names_the_known_ones(command: str, computed: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, str(computed), "--state", "flat"]) == 2
+    line = error_line(capsys)
+    assert "'flat'" in line
+    assert "relaxed, stretch-0.0250" in line
+
+
+def test_report_is_rebuilt_from_the_file_alone(
+    computed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # Drawing takes long and has tests of its own.
+    monkeypatch.setattr(import_module("circuittex.report.page"), "save_figures", lambda study, folder: {})
+    assert main(["report", str(computed)]) == 0
+    assert capsys.readouterr().out == f"{computed / 'report.html'}\n"
+    assert "stretch-0.0250" in (computed / "report.html").read_text(encoding="utf-8")
+    states = json.loads((computed / "summary.json").read_text(encoding="utf-8"))["states"]
+    assert [state["name"] for state in states] == ["relaxed", "stretch-0.0250"]
+
+
+def test_full_subcircuit_holds_every_contact(computed: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["netlist", str(computed), "--resolution", "full"]) == 0
+    circuit = parse(capsys.readouterr().out)
+    contacts = load_study(computed / "results.h5").records[0].contacts
+    ends = [f"{kind}{k}_{end}" for kind in ("warp", "weft") for k in range(1, 5) for end in ("minus", "plus")]
+    assert list(pin_names(circuit)) == ends
+    # 60 random contacts over 16 fibrils: all of them are reached, and none is near enough to another to matter
+    found = np.sort(1.0 / circuit.resistance[circuit.resistor_kind == CONTACT])
+    np.testing.assert_allclose(found, np.sort(contacts.conductance), rtol=1e-12)
+
+
+def test_merged_subcircuit_conducts_as_much(computed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "merged.cir"
+    assert main(["netlist", str(computed), "--state", "stretch-0.0250", "--out", str(path)]) == 0
+    assert capsys.readouterr() == ("", "")
+    text = path.read_text(encoding="ascii")
+    circuit, contacts = parse(text), load_study(computed / "results.h5").records[1].contacts
+    kept = circuit.resistor_kind == CONTACT
+    assert kept.sum() < contacts.n_contacts
+    assert np.sum(1.0 / circuit.resistance[kept]) == pytest.approx(contacts.conductance.sum(), rel=1e-12)
+    assert '* state: "stretch-0.0250"' in text
+
+
+def test_deck_of_a_probe_drives_its_terminals(computed: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["netlist", str(computed), "--kind", "deck", "--probe", "parallel"]) == 0
+    sources = [line.split()[1:] for line in capsys.readouterr().out.splitlines() if line.startswith("V")]
+    assert sources == [["parallel", "0", "1.0"], ["common", "0", "0.0"]]
+
+
+def test_reduced_netlist(computed: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["netlist", str(computed), "--kind", "reduced"]) == 0
+    circuit = parse(capsys.readouterr().out)
+    # 4 x 4 crossings: 8 yarns of 3 inner Ry and 2 outer Ry/2, and 16 Rc; the made-up fit has Ry 0.2827 and Rc 210 ohm
+    values, counts = np.unique(circuit.resistance, return_counts=True)
+    np.testing.assert_allclose(values, [0.2827 / 2, 0.2827, 210.0], rtol=1e-12)
+    assert counts.tolist() == [16, 24, 16]
+
+
+def test_unknown_probe_names_the_known_ones(computed: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["netlist", str(computed), "--kind", "deck", "--probe", "diagonal"]) == 2
+    assert "straight, parallel, perpendicular" in error_line(capsys)
+
+
+def test_netlist_that_ngspice_would_not_finish_comes_with_a_note(
+    computed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("circuittex.ngspice.feasible", lambda resistors: False)
+    assert main(["netlist", str(computed)]) == 0
+    assert "circuittex: note: " in capsys.readouterr().err
+
+
+def test_verify_confirms_with_ngspice(computed: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["verify", str(computed), "--state", "relaxed"]) == 0
+    text = capsys.readouterr().out
+    assert "fields, nodal, ngspice" in text
+    assert "stretch" not in text
+
+
+def test_verify_without_ngspice_is_no_confirmation(
+    computed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("circuittex.ngspice.find_ngspice", lambda: None)
+    assert main(["verify", str(computed), "--state", "relaxed"]) == 1
+    assert "NOT confirmed" in capsys.readouterr().out
+
+
+def test_verify_finds_a_route_that_disagrees(
+    computed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def wrong(circuit: Circuit, drive: Mapping[str, float]) -> NodalSolution:
+        right = solve_nodal(circuit, drive)
+        return NodalSolution(right.voltage * (1 + 1e-8), right.port_current * (1 + 1e-8))
+
+    monkeypatch.setattr("circuittex.verify.solve_nodal", wrong)
+    assert main(["verify", str(computed), "--state", "relaxed"]) == 1
+    assert "NOT confirmed" in capsys.readouterr().out

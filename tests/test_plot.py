@@ -1,0 +1,193 @@
+"""Figures: what is drawn against closed forms, valid files, and no global state."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from synthetic import fibrils
+from synthetic_study import INSULATED, synthetic_study
+
+from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.mech.configuration import initial_configuration
+from circuittex.plot import FIGURES, force_figure, network_figure, probe_figure, save_figures, section_figure
+from circuittex.plot.curves import loading_paths
+from circuittex.plot.cut import cut
+from circuittex.plot.scene import camera, draw_tubes
+from circuittex.plot.style import save, style
+from circuittex.store.archive import Digests
+
+STUDY = synthetic_study(2, contacts=40, rows=(3,), paths=("stretch", "shear"))
+SVG = "{http://www.w3.org/2000/svg}"
+LINK = "{http://www.w3.org/1999/xlink}href"
+
+
+@pytest.fixture(scope="module")
+def gallery(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("figures")
+    assert set(save_figures(STUDY, folder)) == set(FIGURES)
+    return folder
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_files_are_valid_and_self_contained(gallery: Path, name: str) -> None:
+    assert (gallery / f"{name}.png").read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
+    root = ElementTree.parse(gallery / f"{name}.svg").getroot()
+    assert root.tag == f"{SVG}svg"
+    for element in root.iter():
+        assert element.get(LINK, "#").startswith(("#", "data:image/png;base64,"))
+    assert (gallery / f"{name}.svg").stat().st_size < 2_000_000
+
+
+def test_same_study_gives_the_same_files(gallery: Path, tmp_path: Path) -> None:
+    for name in ("cell", "network"):
+        for file in save(FIGURES[name](STUDY), tmp_path, name):
+            assert file.read_bytes() == (gallery / file.name).read_bytes()
+
+
+def test_nothing_global_is_touched() -> None:
+    before, digest = dict(mpl.rcParams), Digests()(STUDY)
+    for name in ("cell", "section", "currents", "network"):
+        FIGURES[name](STUDY)
+    assert dict(mpl.rcParams) == before
+    assert Digests()(STUDY) == digest
+    code = "import sys, circuittex.plot; assert 'matplotlib.pyplot' not in sys.modules"
+    assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
+
+
+def test_camera_keeps_lengths_and_looks_along_its_axis() -> None:
+    view = camera(-62.0, 38.0)
+    np.testing.assert_allclose(view.frame @ view.frame.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(view.frame) == pytest.approx(1.0)
+    assert view.project(np.array([0.0, 0.0, 1.0]))[1] > 0.0  # up is up
+
+
+def crossing(height: float) -> tuple[FibrilMesh, Floats]:
+    """Two straight fibrils that cross at right angles; the second lies `height` above the first."""
+    mesh = fibrils([4.0, 4.0], elements=8)
+    x = initial_configuration(mesh).x.copy()
+    second = mesh.node_fibril == 1
+    x[second, 0] = np.stack([2.0 + 0 * mesh.xi[second], mesh.xi[second] - 2.0, height + 0 * mesh.xi[second]], axis=1)
+    x[second, 1] = [-1.0, 0.0, 0.0]
+    return mesh, x
+
+
+@pytest.mark.parametrize("height", [0.3, -0.3])
+def test_the_upper_fibril_hides_the_lower(height: float) -> None:
+    mesh, x = crossing(height)
+    figure = Figure(figsize=(2.0, 2.0), dpi=100)
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    colours = ScalarMappable(Normalize(0.0, 1.0), "gray")
+    values = np.where(np.repeat([0, 1], 8) == 1, 1.0, 0.4)
+    draw_tubes(axes, mesh, x, values, colours, camera(-90.0, 90.0), 16)
+    axes.set(xlim=(0.0, 4.0), ylim=(-2.0, 2.0))
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[..., 0]
+    middle = pixels.shape[0] // 2
+
+    def brightest(piece: np.ndarray) -> float:
+        return float(piece.max())
+
+    at_crossing = brightest(pixels[middle - 2 : middle + 3, middle - 2 : middle + 3])
+    first = brightest(pixels[middle - 2 : middle + 3, middle // 2])
+    second = brightest(pixels[middle // 2, middle - 2 : middle + 3])
+    assert first < 0.6 * second
+    assert at_crossing == pytest.approx(second if height > 0.0 else first, abs=3)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.75])
+def test_cut_across_is_an_ellipse(slope: float) -> None:
+    mesh = fibrils([4.0], elements=8)
+    tangent = np.array([1.0, 0.0, slope]) / np.hypot(1.0, slope)
+    x = initial_configuration(mesh).x.copy()
+    x[:, 0] = mesh.xi[:, None] * tangent
+    x[:, 2] = np.cross(tangent, [0.0, 1.0, 0.0])
+    pieces = cut(mesh, x, 0, 1.3)
+    (outline,) = pieces.across
+    y, z = outline[:, 0], outline[:, 1] - 1.3 * slope
+    # Semi-axes R and R / cos of the inclination; the surface between nodes is straight here, so this is exact.
+    np.testing.assert_allclose((y / 0.15) ** 2 + (z / (0.15 * np.hypot(1.0, slope))) ** 2, 1.0, rtol=1e-12)
+    assert pieces.along == ()
+
+
+@pytest.mark.parametrize(("distance", "half"), [(0.0, 0.15), (0.09, 0.12)])
+def test_cut_along_is_a_strip(distance: float, half: float) -> None:
+    mesh = fibrils([4.0], elements=8)
+    pieces = cut(mesh, initial_configuration(mesh).x, 1, distance)
+    (outline,) = pieces.along
+    assert len(pieces.across) == 0
+    np.testing.assert_allclose(np.abs(outline[:, 1]), half, rtol=1e-12)
+    assert outline[:, 0].min() == 0.0
+    assert outline[:, 0].max() == 4.0
+    assert cut(mesh, initial_configuration(mesh).x, 1, 0.16).along == ()
+
+
+def test_section_shows_as_many_circles_as_fibrils() -> None:
+    for axis, place in ((0, -1.0), (1, -1.0)):
+        pieces = cut(STUDY.mesh, STUDY.initial.x, axis, place)
+        assert np.array_equal(pieces.across_fibril, np.flatnonzero(STUDY.mesh.yarn_axis[STUDY.mesh.yarn] == axis))
+        assert set(STUDY.mesh.yarn[pieces.along_fibril]) == {5 if axis == 0 else 1}  # weft2 or warp2
+    assert [axes.get_xlabel() for axes in section_figure(STUDY, STUDY.records[0]).axes[2:]] == [
+        "y (mm), across warp2",
+        "x (mm), along warp2",
+    ]
+
+
+def test_every_path_starts_at_the_relaxed_state() -> None:
+    paths = loading_paths(STUDY)
+    assert list(paths) == ["stretch", "shear"]
+    assert [record.name for record in paths["shear"]] == ["relaxed", "shear-0.0250"]
+    assert list(loading_paths(replace(STUDY, records=STUDY.records[:1]))) == [""]
+
+
+def test_curves_carry_the_numbers() -> None:
+    left, right = force_figure(STUDY).axes
+    drawn = {line.get_label(): line.get_ydata() for line in left.lines}
+    assert list(drawn["Fx, stretch"]) == [STUDY.records[0].clamp_force[0, 0], STUDY.records[1].clamp_force[0, 0]]
+    assert len(right.lines) == 6
+    labels = [str(line.get_label()) for line in network_figure(synthetic_study(2, contacts=4)).axes[0].lines]
+    assert labels[-1] == f"insulated, {INSULATED:.4g} Ω"
+
+
+def test_all_axes_of_curves_have_units() -> None:
+    for name in ("forces", "probes", "network"):
+        for axes in FIGURES[name](STUDY).axes:
+            assert axes.get_xlabel().startswith("strain")
+            assert axes.get_ylabel().endswith(")")
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_figures_of_a_study_without_loading(name: str) -> None:
+    assert isinstance(FIGURES[name](replace(STUDY, records=STUDY.records[:1])), Figure)
+
+
+def test_study_without_probes_has_no_figures_of_them(tmp_path: Path) -> None:
+    bare = replace(
+        STUDY,
+        design=replace(STUDY.design, probes=()),
+        records=tuple(replace(record, fields=()) for record in STUDY.records),
+    )
+    assert set(save_figures(bare, tmp_path)) == {"cell", "section", "forces", "verification"}
+
+
+def test_fields_without_any_current() -> None:
+    record = STUDY.records[0]
+    silent = tuple(
+        replace(f, segment_current=0 * f.segment_current, temperature=0 * f.temperature) for f in record.fields
+    )
+    for quantity in ("current", "temperature"):
+        figure = probe_figure(STUDY, replace(record, fields=silent), quantity)
+        with style():
+            figure.draw_without_rendering()

@@ -1,0 +1,113 @@
+"""The report: self-contained, well-formed, escaped, and plain about what was not checked."""
+
+from __future__ import annotations
+
+import base64
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from synthetic_study import synthetic_study
+from test_summary import unchecked
+
+from circuittex.plot import FIGURES
+from circuittex.report import page, write_report
+from circuittex.results import Study
+
+PNG = b"\x89PNG\r\n\x1a\nno real picture"
+STUDY = synthetic_study(3, contacts=40, name="<b>A & \"B\"</b> $HOME 'x'")
+EMPTY_ELEMENTS = {"meta", "img", "br"}
+
+
+class Checker(HTMLParser):
+    """Collects the text and checks that every element is closed where it must be."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.text: list[str] = []
+        self.sources: list[str] = []
+        self.seen: set[str] = set()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.seen.add(tag)
+        self.sources += [str(value) for name, value in attrs if name in ("src", "href", "srcset", "data")]
+        if tag not in EMPTY_ELEMENTS:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+
+def parsed(study: Study) -> Checker:
+    checker = Checker()
+    checker.feed(page(study, dict.fromkeys(FIGURES, PNG) if study.records else {}))
+    checker.close()
+    assert checker.open == []
+    return checker
+
+
+def test_page_is_well_formed_and_self_contained() -> None:
+    checker = parsed(STUDY)
+    assert len(checker.sources) == len(FIGURES)
+    for source in checker.sources:
+        head, data = source.split(",")
+        assert head == "data:image/png;base64"
+        assert base64.b64decode(data, validate=True) == PNG
+    assert not checker.seen & {"script", "link", "iframe", "b"}
+    assert not re.search(r"https?:|url\(|@import", page(STUDY, {}))
+
+
+def test_names_are_shown_as_they_are() -> None:
+    assert STUDY.design.name in parsed(STUDY).text
+
+
+def test_numbers_are_in_the_tables() -> None:
+    text = parsed(STUDY).text
+    for record in STUDY.records:
+        assert text.count(record.name) == 5  # states, forces, equilibrium, network, verification
+        assert record.netlist in text
+        assert f"{record.currents[2]:.4g}" in text
+        assert f"{record.fit.Ry:.4g}" in text
+        assert f"{record.clamp_force[0, 0]:.4f}" in text
+    assert STUDY.design_hash in text
+
+
+def test_agreement_and_its_lack_are_said_plainly() -> None:
+    good = page(STUDY, {})
+    assert "ngspice confirmed every recorded state." in good
+    assert 'class="bad"' not in good
+    missing = page(unchecked(STUDY, "relaxed"), {})
+    assert 'class="bad"' in missing
+    assert "ngspice did NOT check relaxed" in missing
+    assert "NOT CHECKED ngspice was not found" in missing
+
+
+@pytest.mark.parametrize("difference", [2e-9, float("nan")])
+def test_disagreement_is_said_plainly(difference: float) -> None:
+    first = STUDY.records[0]
+    wrong = replace(first, verification=replace(first.verification, max_current_difference=difference))
+    text = page(replace(STUDY, records=(*STUDY.records, wrong)), {})
+    assert "DISAGREE" in text
+    assert 'class="bad"' in text
+
+
+def test_study_without_states(tmp_path: Path) -> None:
+    path = write_report(tmp_path / "new folder", replace(STUDY, records=()))
+    assert "No state has been recorded" in path.read_text("utf-8")
+    assert parsed(replace(STUDY, records=())).sources == []
+
+
+def test_report_shows_the_figures_it_draws(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in set(FIGURES) - {"forces", "network"}:  # two are enough to see, and the others take long
+        monkeypatch.delitem(FIGURES, name)
+    content = write_report(tmp_path, STUDY).read_text("utf-8")
+    for name in ("forces", "network"):
+        png = (tmp_path / "figures" / f"{name}.png").read_bytes()
+        assert base64.b64encode(png).decode() in content
+    assert content.count("<figure>") == 2

@@ -1,0 +1,269 @@
+"""The results file: bit-for-bit round trips, sharing, and safety against kills, full disks and damage."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from synthetic_study import synthetic_study
+
+from circuittex.errors import StoreError
+from circuittex.frozen import frozen, same
+from circuittex.results import Study
+from circuittex.store import append_record, load_study, write_study_start
+from circuittex.store.archive import Digests, Reader, Writer, registry
+
+STUDY = synthetic_study(2, contacts=40)
+
+
+@frozen
+class Inner:
+    values: np.ndarray
+    label: str
+
+
+@frozen
+class Outer:
+    first: Inner
+    second: Inner
+    anything: object
+
+
+def round_trip(value: object) -> object:
+    with h5py.File("memory", "w", driver="core", backing_store=False) as file:
+        Writer(file).put(file, "value", value)
+        return Reader(registry(Outer)).get(file, "value")
+
+
+@pytest.fixture
+def stored(tmp_path: Path) -> Path:
+    path = tmp_path / "results.h5"
+    write_study_start(path, STUDY)
+    return path
+
+
+def test_study_comes_back_bit_for_bit(stored: Path) -> None:
+    loaded = load_study(stored)
+    assert same(loaded, STUDY)
+    assert Digests()(loaded) == Digests()(STUDY)  # also the sign of zeros, which == does not see
+
+
+def test_states_appended_one_by_one_give_the_same_study(tmp_path: Path) -> None:
+    path = tmp_path / "results.h5"
+    write_study_start(path, replace(STUDY, records=()))
+    assert load_study(path).records == ()
+    for number, record in enumerate(STUDY.records):
+        append_record(path, record)
+        assert len(load_study(path).records) == number + 1
+    assert same(load_study(path), STUDY)
+    assert [file.name for file in tmp_path.iterdir()] == ["results.h5"]
+
+
+def test_loaded_arrays_are_locked(stored: Path) -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        load_study(stored).records[0].contacts.xi_a[0] = 1.0
+
+
+def test_the_mesh_is_one_object_and_is_stored_once(stored: Path, tmp_path: Path) -> None:
+    loaded = load_study(stored)
+    assert all(record.contacts.mesh is loaded.mesh for record in loaded.records)
+    assert loaded.records[0].fields[0].xi is loaded.records[0].fields[1].xi
+    empty = tmp_path / "empty.h5"
+    write_study_start(empty, replace(STUDY, records=()))
+    mesh_bytes = sum(a.nbytes for a in vars(STUDY.mesh).values() if isinstance(a, np.ndarray))
+    record = STUDY.records[0]
+    states = [record.configuration.x, *(a for a in vars(record.contacts).values() if isinstance(a, np.ndarray))]
+    for fields in record.fields:
+        states += [a for a in vars(fields).values() if isinstance(a, np.ndarray)]
+    growth = (stored.stat().st_size - empty.stat().st_size) / len(STUDY.records)
+    assert growth < sum(a.nbytes for a in states) + mesh_bytes / 2
+
+
+def test_the_file_reads_well_in_any_viewer(stored: Path) -> None:
+    with h5py.File(stored) as file:
+        assert file.attrs["format"] == "circuittex results"
+        first = file["records/0000"]
+        assert first.attrs["name"] == "relaxed"
+        np.testing.assert_array_equal(first["contacts/line_load"][()], STUDY.records[0].contacts.line_load)
+        kinds: set[str] = set()
+        file.visititems(lambda _, item: kinds.add(item.dtype.kind) if isinstance(item, h5py.Dataset) else None)
+        file["records"].visititems(lambda _, item: kinds.add(item.attrs["@type"]) or None)
+    assert "V" not in kinds
+    assert {"Record", "ContactState", "Fields", "Fit"} <= kinds
+
+
+@pytest.mark.parametrize(
+    "array",
+    [
+        np.array([np.nan, -0.0, np.inf, 5e-324]),
+        np.empty((0, 3)),
+        np.array(2.5),
+        np.arange(3000, dtype=np.int32).reshape(2, -1),
+        np.asfortranarray(np.arange(600.0).reshape(20, 30)),
+        np.array([True, False]),
+        np.array([1 + 2j]),
+        np.arange(3, dtype=">f8"),
+    ],
+    ids=lambda array: f"{array.dtype}{array.shape}",
+)
+def test_arrays(array: np.ndarray) -> None:
+    loaded = round_trip(array)
+    assert isinstance(loaded, np.ndarray)
+    assert (loaded.dtype, loaded.shape, loaded.tobytes()) == (array.dtype, array.shape, array.tobytes())
+
+
+scalars = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-(2**63), 2**63 - 1),
+    st.floats(),
+    st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0")),
+)
+
+
+@given(st.recursive(scalars, lambda inner: st.lists(inner, max_size=4).map(tuple), max_leaves=12))
+def test_nested_tuples_of_scalars(value: object) -> None:
+    assert same(round_trip(value), value)
+
+
+def test_equal_parts_are_shared_and_numpy_scalars_keep_their_type() -> None:
+    inner = Inner(np.arange(3.0), "ä\n")
+    loaded = round_trip(Outer(inner, Inner(np.arange(3.0), "ä\n"), np.float32(0.1)))
+    assert isinstance(loaded, Outer)
+    assert loaded.first is loaded.second
+    assert same(loaded.first, inner)
+    assert type(loaded.anything) is np.float32
+
+
+@pytest.mark.parametrize("value", [{"a": 1}, [1], "a\0b", "\ud800", 2**63, np.array(["text"]), np.array([None]), 1j])
+def test_what_cannot_be_stored_is_refused(value: object) -> None:
+    with pytest.raises(StoreError, match="cannot store"):
+        round_trip(value)
+
+
+def test_only_result_types_are_built() -> None:
+    with h5py.File("memory", "w", driver="core", backing_store=False) as file:
+        Writer(file).put(file, "value", Outer(Inner(np.zeros(1), ""), Inner(np.ones(1), ""), None))
+        with pytest.raises(StoreError, match="unknown type 'Outer'"):
+            Reader(registry(Study)).get(file, "value")
+
+
+def test_a_type_with_other_fields_is_refused(stored: Path) -> None:
+    with h5py.File(stored, "r+") as file:
+        del file["records/0000"].attrs["strain"]
+    with pytest.raises(StoreError, match="fields of Record"):
+        load_study(stored)
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    for call in (load_study, lambda path: append_record(path, STUDY.records[0])):
+        with pytest.raises(StoreError, match="no results file"):
+            call(tmp_path / "none.h5")
+    with pytest.raises(StoreError, match="cannot be written"):
+        write_study_start(tmp_path / "no folder" / "results.h5", STUDY)
+
+
+@pytest.mark.parametrize("content", [b"", b"not HDF5 at all", b"\x89HDF\r\n\x1a\n" + bytes(200)])
+def test_not_hdf5(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "results.h5"
+    path.write_bytes(content)
+    assert_refused(path, "cannot be read")
+
+
+def test_foreign_hdf5_and_other_layouts(stored: Path, tmp_path: Path) -> None:
+    foreign = tmp_path / "foreign.h5"
+    with h5py.File(foreign, "w") as file:
+        file["x"] = 1.0
+    assert_refused(foreign, "not a results file of circuittex")
+    with h5py.File(stored, "r+") as file:
+        file.attrs["format_version"] = 99
+    assert_refused(stored, "layout is version 99")
+    with pytest.raises(StoreError, match="layout is version 99"):
+        append_record(stored, STUDY.records[0])
+
+
+@pytest.mark.parametrize("part", [0.02, 0.3, 0.7, 0.99])
+def test_truncated_file(stored: Path, part: float) -> None:
+    content = stored.read_bytes()
+    stored.write_bytes(content[: int(part * len(content))])
+    assert_refused(stored, "cannot be read")
+
+
+def test_a_changed_value_is_noticed(stored: Path) -> None:
+    with h5py.File(stored, "r+") as file:
+        file["records/0001"].attrs["strain"] = 0.5
+    assert_refused(stored, "record 0001 does not match its digest")
+
+
+def test_flipped_bits_are_noticed_or_harmless(stored: Path) -> None:
+    content = stored.read_bytes()
+    refused = 0
+    for position in np.random.default_rng(5).integers(0, len(content), 25):
+        damaged = bytearray(content)
+        damaged[position] ^= 0x10
+        stored.write_bytes(damaged)
+        try:
+            assert same(load_study(stored), STUDY)
+        except StoreError:
+            refused += 1
+    assert refused > 5  # most of the file is content, not padding
+
+
+def assert_refused(path: Path, reason: str) -> None:
+    with pytest.raises(StoreError, match=re.escape(reason)) as caught:
+        load_study(path)
+    assert "\n" not in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize("step", ["fsync", "replace"])
+def test_full_disk_leaves_the_old_file(stored: Path, monkeypatch: pytest.MonkeyPatch, step: str) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    before = stored.read_bytes()
+    monkeypatch.setattr(*((os, "fsync") if step == "fsync" else (Path, "replace")), full)
+    with pytest.raises(StoreError, match="No space left"):
+        append_record(stored, STUDY.records[0])
+    assert stored.read_bytes() == before
+    assert [file.name for file in stored.parent.iterdir()] == ["results.h5"]
+
+
+CHILD = """
+import sys
+from pathlib import Path
+from circuittex.store import append_record, load_study
+path = Path(sys.argv[1])
+record = load_study(path).records[0]
+for count in range(1000):
+    append_record(path, record)
+    print(count + 1, flush=True)
+"""
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.013, 0.031])
+def test_killed_while_appending(tmp_path: Path, delay: float) -> None:
+    path = tmp_path / "results.h5"
+    write_study_start(path, replace(STUDY, records=STUDY.records[:1]))
+    with subprocess.Popen([sys.executable, "-c", CHILD, str(path)], stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == "1\n"
+        time.sleep(delay)
+        child.kill()
+        acknowledged = 1 + len(child.stdout.readlines())
+    loaded = load_study(path)
+    assert len(loaded.records) - 1 in (acknowledged, acknowledged + 1)
+    assert all(same(record, STUDY.records[0]) for record in loaded.records)
+    append_record(path, STUDY.records[1])  # whatever the kill left behind is no obstacle
+    assert same(load_study(path).records[-1], STUDY.records[1])

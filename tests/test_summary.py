@@ -1,0 +1,101 @@
+"""summary.json and the closing table."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic import fibrils
+from synthetic_study import INSULATED, synthetic_study
+
+from circuittex.frozen import same
+from circuittex.results import Study
+from circuittex.summary import insulated_resistance, ngspice_statement, summary, table, write_summary
+
+STUDY = synthetic_study(3, contacts=40)
+
+
+def written(study: Study, folder: Path) -> dict[str, Any]:
+    def refuse(constant: str) -> None:
+        raise AssertionError(f"{constant} is not JSON")
+
+    write_summary(folder / "summary.json", study)
+    content: dict[str, Any] = json.loads((folder / "summary.json").read_text("utf-8"), parse_constant=refuse)
+    return content
+
+
+def unchecked(study: Study, *names: str) -> Study:
+    """The study as if ngspice had been missing for the states `names`."""
+    lost = {"ngspice_checked": False, "routes": ("fields", "nodal"), "note": "ngspice was not found"}
+    return replace(
+        study,
+        records=tuple(
+            replace(r, verification=replace(r.verification, **lost)) if r.name in names else r for r in study.records
+        ),
+    )
+
+
+def test_keys_that_the_documentation_promises(tmp_path: Path) -> None:
+    content = written(STUDY, tmp_path)
+    assert content["format"] == 1
+    assert content["design_hash"] == STUDY.design_hash
+    assert content["parameters"]["weave"]["pitch"] == 2.0
+    assert len(content["states"]) == 3
+    state, record = content["states"][1], STUDY.records[1]
+    assert state["name"] == "stretch-0.0250"
+    assert state["strain"] == 0.025
+    assert state["residual_N"] == record.residual
+    assert state["newton_iterations"] == 14
+    assert state["clamp_force_N"] == {"x": record.clamp_force[0].tolist(), "y": record.clamp_force[1].tolist()}
+    assert state["currents_A"] == [float(fields.currents[0]) for fields in record.fields]
+    assert len(state["currents_A"]) == 3
+    assert state["peak_temperature_K"] == record.peak_temperature
+    assert (state["Ry_ohm"], state["Rc_ohm"]) == (record.fit.Ry, record.fit.Rc)
+    assert state["fit_residual"] == record.fit.residual
+    assert state["netlist"] == record.netlist
+    assert state["verification"]["routes"] == ["fields", "nodal", "ngspice"]
+    assert state["verification"]["max_voltage_difference_V"] == 4e-13
+    assert state["verification"]["max_current_difference"] == 2e-12
+
+
+def test_undefined_numbers_are_null(tmp_path: Path) -> None:
+    record = STUDY.records[0]
+    fit = replace(record.fit, Rc=math.inf, covariance=np.full((2, 2), math.nan))
+    hollow = replace(record, fit=fit, fields=(), verification=replace(record.verification, merge_error=math.nan))
+    state = written(replace(STUDY, records=(hollow,)), tmp_path)["states"][0]
+    assert state["Rc_ohm"] is None
+    assert state["peak_temperature_K"] is None
+    assert state["verification"]["merge_error"] is None
+
+
+def test_study_is_not_changed() -> None:
+    before = synthetic_study(3, contacts=40)
+    summary(STUDY)
+    assert same(before, STUDY)
+
+
+def test_insulated_resistance_is_that_of_the_paper() -> None:
+    assert insulated_resistance(STUDY.mesh) == pytest.approx(INSULATED, rel=1e-12)
+    assert pytest.approx(0.2829, abs=5e-5) == INSULATED  # [57]
+    assert insulated_resistance(fibrils([1.0], sigma=0.0)) == math.inf
+
+
+def test_table_has_a_line_for_each_state() -> None:
+    lines = table(STUDY).splitlines()
+    assert [line.split()[0] for line in lines[:4]] == ["state", "relaxed", "stretch-0.0250", "stretch-0.0500"]
+    assert len({len(line) for line in lines[:4]}) == 1
+    assert lines[-1] == "ngspice confirmed every recorded state."
+
+
+def test_missing_ngspice_is_said_plainly() -> None:
+    some = ngspice_statement(unchecked(STUDY, "relaxed"))
+    assert some[0].startswith("ngspice did NOT check relaxed:")
+    assert some[1:] == ("ngspice was not found",)
+    every = table(unchecked(STUDY, *(record.name for record in STUDY.records)))
+    assert "ngspice did NOT check any state" in every
+    assert "confirmed" not in every

@@ -39,7 +39,9 @@ def sites(contacts: ContactState, live: Ints) -> tuple[Ints, Floats, Ints, Ints]
     limit = mesh.length[fibril]
     if np.any(xi > limit * (1 + _OUTSIDE)):
         far = int(np.argmax(xi - limit))
-        raise CircuitError(f"a contact foot lies at xi = {float(xi[far])!r} on a fibril that ends at {float(limit[far])!r} mm")
+        raise CircuitError(
+            f"a contact foot lies at xi = {float(xi[far])!r} on a fibril that ends at {float(limit[far])!r} mm"
+        )
     xi = np.clip(xi, 0.0, limit)
     order = np.lexsort((xi, fibril))
     new = np.ones(len(order), dtype=bool)
@@ -62,7 +64,9 @@ def axial_resistance(contacts: ContactState, fibril: Ints, xi: Floats) -> Floats
     mesh = contacts.mesh
     if not (np.isfinite(contacts.axial_factor).all() and contacts.axial_factor.min(initial=1.0) > 0.0):
         bad = int(np.argmin(np.where(np.isfinite(contacts.axial_factor), contacts.axial_factor, -1.0)))
-        raise CircuitError(f"axial_factor of element {bad} is {float(contacts.axial_factor[bad])!r}; it must be positive")
+        raise CircuitError(
+            f"axial_factor of element {bad} is {float(contacts.axial_factor[bad])!r}; it must be positive"
+        )
     start_fibril, start_xi = mesh.element_fibril, mesh.xi[mesh.elements[:, 0]]
     kept = np.flatnonzero(mesh.electrical_conductivity[start_fibril] > 0)
     # Element starts come before the sites at the same place, so that a site reads the element that begins there.

@@ -16,8 +16,8 @@ from circuittex.nodal import solve_nodal
 
 # A current below this fraction of the largest is none: it is rounding of the solution that it came from.
 _NONE = 1e-12
-# Rc / Ry of the start values, two for each decade, and how far beyond them the search may go.
-_RATIOS = np.logspace(-8.0, 10.0, 37)
+# Rc / Ry of the start values, one for each decade, and how far beyond them the search may go.
+_RATIOS = np.logspace(-8.0, 10.0, 19)
 _BEYOND = 10.0
 # A value is called undetermined where a relative error of the weighted currents comes back this many times larger.
 _AMPLIFIED = 100.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import re
 import shutil
@@ -96,7 +97,7 @@ def estimated_seconds(resistors: int) -> float:
     >>> estimated_seconds(1000) < 0.1 < 10.0 < estimated_seconds(20_000)
     True
     """
-    return 0.02 + 5.0 * (resistors / 10_000) ** 2.8
+    return 0.02 + 5.0 * math.pow(resistors / 10_000, 2.8)
 
 
 def feasible(resistors: int, seconds: float = 60.0) -> bool:

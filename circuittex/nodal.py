@@ -28,23 +28,37 @@ class NodalSolution:
 class PortBasis:
     """The response of a circuit to one volt at each of D driven ports in turn, the other driven ports at 0 V."""
 
+    circuit: Circuit
+    """The circuit it belongs to."""
     ports: tuple[str, ...]
     """(D,) the driven ports."""
-    port_index: Ints
-    """(D,) their places among the ports of the circuit."""
-    n_ports: int
-    """P, ports of the circuit."""
     potential: Floats
-    """(K, D) node voltages, V."""
-    admittance: Floats
-    """(D, D) Y[p, q] = Σ G Δφ_p Δφ_q, S: current into port p for one volt at port q, all others at 0 V."""
+    """(K, D) node voltages φ, V per V."""
+    flow: Floats
+    """(R, D) currents G Δφ through the resistors, S."""
+
+    @property
+    def admittance(self) -> Floats:
+        """(D, D) Y[p, q] = Σ G Δφ_p Δφ_q, S: current into port p for one volt at port q, the others at 0 V."""
+        return self.flow.T @ self._drop(self.potential)
 
     def solve(self, drive: Mapping[str, float]) -> NodalSolution:
-        """Return the solution for voltages at exactly these driven ports."""
+        """Return the solution for voltages at exactly these driven ports.
+
+        The current into port p is the energy product Σ G Δφ_p ΔV. It equals the sum of the currents that leave the
+        port, but that sum loses the digits of ΔV where a port hangs on a tiny resistor. Voltages are taken from the
+        first port, so that what all ports have in common costs no digits either.
+        """
         volts = np.array([drive[port] for port in self.ports], dtype=np.float64)
-        current = np.zeros(self.n_ports)
-        current[self.port_index] = self.admittance @ volts
-        return NodalSolution(voltage=self.potential @ volts, port_current=current)
+        above = self.potential @ (volts - volts[0])
+        current = np.zeros(len(self.circuit.ports))
+        current[[self.circuit.ports.index(port) for port in self.ports]] = self.flow.T @ self._drop(above)
+        return NodalSolution(voltage=above + volts[0], port_current=current)
+
+    def _drop(self, voltage: Floats) -> Floats:
+        i, j = self.circuit.resistor_nodes.T
+        difference: Floats = voltage[i] - voltage[j]
+        return difference
 
 
 def solve_nodal(circuit: Circuit, drive: Mapping[str, float]) -> NodalSolution:
@@ -76,11 +90,7 @@ def solve_drives(circuit: Circuit, drives: Sequence[Mapping[str, float]]) -> tup
 
 
 def port_basis(circuit: Circuit, ports: Sequence[str]) -> PortBasis:
-    """Factorise the circuit with these ports held, and return its response to one volt at each of them.
-
-    Currents are the energy products Σ G Δφ_p Δφ_q and not sums of the currents that leave a port: both are
-    equal in exact arithmetic, but the sum loses the digits of Δφ where a port hangs on a tiny resistor.
-    """
+    """Factorise the circuit with these ports held, and return its response to one volt at each of them."""
     fixed = port_nodes(circuit, ports)
     _refuse_islands(circuit, fixed)
     inner = np.setdiff1d(np.arange(circuit.n_nodes), fixed)
@@ -95,14 +105,8 @@ def port_basis(circuit: Circuit, ports: Sequence[str]) -> PortBasis:
         for _ in range(2):  # the second pass is one step of iterative refinement
             flow = conductance[:, None] * (difference @ potential)
             potential[inner] -= lu.solve(inwards @ flow)
-    drop = difference @ potential
-    return PortBasis(
-        ports=tuple(ports),
-        port_index=np.array([circuit.ports.index(port) for port in ports], dtype=np.int64),
-        n_ports=len(circuit.ports),
-        potential=potential,
-        admittance=drop.T @ (conductance[:, None] * drop),
-    )
+    flow = conductance[:, None] * (difference @ potential)
+    return PortBasis(circuit=circuit, ports=tuple(ports), potential=potential, flow=flow)
 
 
 def _incidence(circuit: Circuit) -> csc_array:

@@ -19,7 +19,7 @@ from circuittex.geometry.mesh import FibrilMesh, Floats
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.linear import LinearSolver, best_solver
-from circuittex.relax import Equilibrium, clamp_force, move, relax
+from circuittex.relaxation import Equilibrium, clamp_force, move, relax
 from circuittex.report import write_report
 from circuittex.results import Record, Study
 from circuittex.store import append_record, write_study_start

@@ -84,36 +84,28 @@ def verify(
     seconds; where it does not, `ngspice_checked` is False and `note` says why. `fields` are the finite element
     solutions on all `contacts` with the mesh "feet", for whoever has them already.
     """
+    if not probes:
+        nan = float("nan")
+        return Verification((), nan, nan, nan, nan, 0.0, 0.0, nan, False, "there are no probes to verify")
     clock = _Clock()
-    full = clock("fields", solve_probes, contacts, terminals, probes) if fields is None else fields
     coarse = clock("fields", solve_probes, contacts, terminals, probes, mesh="mechanical")
-    small = clock("fields", solve_probes, simplified, terminals, probes)
-
-    pairs = [_pair(terminals, probe) for probe in probes]
-    full_circuits = [build_circuit(contacts, pair) for pair in pairs]
-    circuits = [build_circuit(simplified, pair) for pair in pairs]
-    full_nodal = [clock("nodal", _nodal, c, p) for c, p in zip(full_circuits, probes, strict=True)]
-    routes = {
-        "fields": [_from_fields(c, f) for c, f in zip(circuits, small, strict=True)],
-        "nodal": [clock("nodal", _nodal, c, p) for c, p in zip(circuits, probes, strict=True)],
-    }
+    _, full_fields, full_nodal = _native(clock, contacts, terminals, probes, fields)
+    circuits, *answers = _native(clock, simplified, terminals, probes, None)
+    routes = dict(zip(("fields", "nodal"), answers, strict=True))
     note = ""
     try:
         routes["ngspice"] = clock("ngspice", _ngspice, circuits, probes, timeout)
     except NgspiceError as error:
         note = f"ngspice did not check this state: {error}"
-
-    full_fields = [_from_fields(c, f) for c, f in zip(full_circuits, full, strict=True)]
-    voltage, current = np.max(
-        [_difference(a, b) for a, b in [(full_fields, full_nodal), *combinations(routes.values(), 2)]], axis=0
-    )
+    compared = [(full_fields, full_nodal), *combinations(routes.values(), 2)]
+    voltage, current = np.max([_difference(a, b) for a, b in compared], axis=0)
     if not (voltage <= AGREEMENT and current <= AGREEMENT):
         note = f"the routes disagree: {voltage:.1e} V per V, currents {current:.1e} relative. {note}".strip()
     return Verification(
         routes=tuple(routes),
         max_voltage_difference=float(voltage),
         max_current_difference=float(current),
-        merge_error=_relative([f.currents[0] for f in small], [f.currents[0] for f in full]),
+        merge_error=_relative([a.current for a in routes["fields"]], [a.current for a in full_fields]),
         field_difference=_relative([f.currents[0] for f in coarse], [a.current for a in full_nodal]),
         fields_seconds=clock.seconds["fields"],
         nodal_seconds=clock.seconds["nodal"],
@@ -140,6 +132,23 @@ class _Clock:
 def _pair(terminals: Sequence[Terminal], probe: Probe) -> list[Terminal]:
     """Source and sink of a probe."""
     return [t for name in (probe.source, probe.sink) for t in terminals if t.name == name]
+
+
+def _native(
+    clock: _Clock,
+    contacts: ContactState,
+    terminals: Sequence[Terminal],
+    probes: Sequence[Probe],
+    fields: Sequence[Fields] | None,
+) -> tuple[list[Circuit], list[_Answer], list[_Answer]]:
+    """The circuit of each probe, and what finite elements (unless given) and nodal analysis say about it."""
+    circuits = [build_circuit(contacts, _pair(terminals, probe)) for probe in probes]
+    solved = clock("fields", solve_probes, contacts, terminals, probes) if fields is None else fields
+    return (
+        circuits,
+        [_from_fields(c, f) for c, f in zip(circuits, solved, strict=True)],
+        [clock("nodal", _nodal, c, p) for c, p in zip(circuits, probes, strict=True)],
+    )
 
 
 def _drive(probe: Probe) -> dict[str, float]:

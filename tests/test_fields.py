@@ -230,6 +230,18 @@ def test_swapping_the_sides_of_contacts_changes_nothing() -> None:
         assert_allclose(a.temperature, b.temperature, rtol=1e-11, atol=1e-16)
 
 
+def test_turning_every_fibril_round_changes_nothing() -> None:
+    state = woven(per_yarn=2, points=4)
+    length = state.mesh.length
+    turned = replace(state, xi_a=length[state.fibril_a] - state.xi_a, xi_b=length[state.fibril_b] - state.xi_b)
+    terminals = [Terminal(t.name, tuple((yarn, -side) for yarn, side in t.ends)) for t in PAPER_TERMINALS]
+    for a, b in zip(
+        solve_probes(state, PAPER_TERMINALS, PAPER_PROBES), solve_probes(turned, terminals, PAPER_PROBES), strict=True
+    ):
+        assert_allclose(a.currents, b.currents, rtol=1e-12)
+        assert_allclose(a.peak_temperature, b.peak_temperature, rtol=1e-11)
+
+
 def test_several_probes_at_once_are_the_same_as_one_by_one() -> None:
     state = woven(per_yarn=2, points=4)
     together = solve_probes(state, PAPER_TERMINALS, PAPER_PROBES)

@@ -30,7 +30,7 @@ ALLOWED: dict[str, set[str]] = {
     "geometry": {"design"},
     "mech": {"geometry", "design"},
     "contact": {"mech.configuration", "mech.terms", "mech.pattern", "mech.space", "geometry", "design"},
-    "relax": {"design", "geometry", "mech", "contact"},
+    "relaxation": {"design", "geometry", "mech", "contact"},
     "fields": {*STATE, "design"},
     "spice_names": set(),
     "feet": {*STATE, "spice_names"},
@@ -49,7 +49,7 @@ ALLOWED: dict[str, set[str]] = {
     "summary": {*RESULT_TYPES, "results"},
     "plot": {*RESULT_TYPES, "results", "tubes", "summary"},
     "report": {*RESULT_TYPES, "results", "summary", "plot"},
-    "study": {"design", "geometry", "mech", "contact", "relax", *ROUTES, "fit", "verify", "results", *OUTPUTS},
+    "study": {"design", "geometry", "mech", "contact", "relaxation", *ROUTES, "fit", "verify", "results", *OUTPUTS},
 }
 ANYTHING = {"cli", "__main__"}  # the command line, which nobody imports
 

@@ -92,6 +92,15 @@ def test_insulated_contacts_leave_two_probes_without_current() -> None:
     assert max(found.max_current_difference, found.merge_error, found.field_difference) < 1e-12
 
 
+def test_without_probes_nothing_is_called_verified() -> None:
+    state = rails(0.5, 0.02, 8.0, 16)
+    assert solve_probes(state, RAILS, []) == ()
+    found = verify(state, state, RAILS, [])
+    assert not found.ngspice_checked
+    assert found.routes == ()
+    assert "no probes" in found.note
+
+
 def test_no_probe_carries_anything() -> None:
     state = touching(fibrils([8.0, 8.0]))
     found = verify(state, state, RAILS, [BETWEEN])

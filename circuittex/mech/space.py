@@ -84,7 +84,7 @@ def beam_space(mesh: FibrilMesh) -> BeamSpace:
     axis_order = [0, 1] if mesh.order == 1 else [0, 2, 1]  # scikit-fem numbers the middle node last
 
     def tables(of: Any) -> tuple[Floats, Floats]:
-        value = np.stack([np.broadcast_to(of.basis[i][0].value, of.dx.shape) for i in axis_order], axis=-1)
+        value = np.stack([np.broadcast_to(np.asarray(of.basis[i][0]), of.dx.shape) for i in axis_order], axis=-1)
         grad = np.stack([of.basis[i][0].grad[0] for i in axis_order], axis=-1)
         return value, grad
 

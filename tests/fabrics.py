@@ -1,0 +1,165 @@
+"""Small fabrics made by hand, shared by the tests of contact, relaxation and dynamics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicHermiteSpline
+
+from circuittex.contact.penalty import PenaltyContact
+from circuittex.design import Design, plain_weave
+from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
+from circuittex.geometry.weave import build_mesh
+from circuittex.mech.configuration import initial_configuration
+from circuittex.mech.space import beam_space
+
+
+def fibrils_through(
+    lines: Sequence[ArrayLike],
+    *,
+    order: int = 1,
+    radius: ArrayLike = 0.15,
+    length: ArrayLike | None = None,
+    modulus: ArrayLike = 10.0,
+    poisson: ArrayLike = 0.0,
+    sigma: ArrayLike = 10.0,
+) -> FibrilMesh:
+    """Fibrils through given nodes (n, 3) each; natural lengths are by default those of the polylines."""
+    nodes = [np.asarray(line, dtype=float) for line in lines]
+    counts = np.array([len(line) for line in nodes])
+    elements = (counts - 1) // order
+    assert np.all(elements * order == counts - 1)
+    polyline = [np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in nodes]
+    L = np.broadcast_to(np.asarray(polyline if length is None else length, dtype=float), counts.shape).copy()
+    first = np.concatenate([[0], np.cumsum(counts)])
+
+    def table(value: ArrayLike) -> Floats:
+        return np.broadcast_to(np.asarray(value, dtype=float), counts.shape).copy()
+
+    return FibrilMesh(
+        position=np.concatenate(nodes),
+        directors=np.concatenate([_frames(line) for line in nodes]),
+        xi=np.concatenate([np.linspace(0.0, L[f], counts[f]) for f in range(len(nodes))]),
+        elements=np.concatenate(
+            [first[f] + order * np.arange(elements[f])[:, None] + np.arange(order + 1) for f in range(len(nodes))]
+        ),
+        first_node=first,
+        first_element=np.concatenate([[0], np.cumsum(elements)]),
+        yarn=np.arange(len(nodes)),
+        length=L,
+        radius=table(radius),
+        youngs_modulus=table(modulus),
+        poisson_ratio=table(poisson),
+        density=table(1.0),
+        electrical_conductivity=table(sigma),
+        thermal_conductivity=table(1.0),
+        yarn_names=tuple(f"warp{f + 1}" for f in range(len(nodes))),
+        yarn_axis=np.zeros(len(nodes), dtype=np.int64),
+    )
+
+
+def _frames(line: Floats) -> Floats:
+    """(n, 2, 3) directors across a line, right-handed with its tangent."""
+    tangent = np.gradient(line, axis=0)
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    g1 = np.cross(tangent, np.eye(3)[np.argmin(np.abs(tangent).max(axis=0))])
+    g1 /= np.linalg.norm(g1, axis=1)[:, None]
+    return np.stack([g1, np.cross(tangent, g1)], axis=1)
+
+
+def straight(start: ArrayLike, stop: ArrayLike, elements: int, order: int = 1) -> Floats:
+    """Equally spaced nodes from `start` to `stop`."""
+    t = np.linspace(0.0, 1.0, elements * order + 1)[:, None]
+    return np.asarray((1 - t) * np.asarray(start, dtype=float) + t * np.asarray(stop, dtype=float))
+
+
+def tangle(
+    seed: int,
+    *,
+    fibrils: int = 6,
+    elements: int = 8,
+    order: int = 1,
+    size: float = 1.0,
+    wave: float = 0.15,
+    noise: float = 0.0,
+    radius: ArrayLike = 0.15,
+) -> FibrilMesh:
+    """Random bent fibrils that cross in a box of the given size: waves of amplitude `wave` and `noise` on each node."""
+    rng = np.random.default_rng(seed)
+    lines = []
+    for _ in range(fibrils):
+        start, stop = rng.uniform(-size, size, (2, 3))
+        line = straight(start, stop + np.array([2.5 * size, 0, 0]), elements, order)
+        t = np.linspace(0.0, 1.0, len(line))[:, None]
+        line += wave * rng.normal(size=3) * np.sin(np.pi * rng.uniform(1, 3) * t + rng.uniform(0, 6))
+        lines.append(line + noise * rng.normal(size=line.shape))
+    return fibrils_through(lines, order=order, radius=radius)
+
+
+def renumbered(mesh: FibrilMesh, order: Sequence[int] | Ints, flip: Sequence[int] = ()) -> tuple[FibrilMesh, Ints]:
+    """The same fibrils in another order, those in `flip` (old numbers) run through backwards.
+
+    Returns the mesh and, for each of its nodes, the node's number in the old one. The first director changes sign
+    along with the tangent, so that the frames stay right-handed.
+    """
+    place = [np.arange(mesh.first_node[f], mesh.first_node[f + 1])[:: -1 if f in flip else 1] for f in order]
+    node = np.concatenate(place)
+    counts, elements = np.diff(mesh.first_node)[list(order)], np.diff(mesh.first_element)[list(order)]
+    first = np.concatenate([[0], np.cumsum(counts)])
+    within = [mesh.order * np.arange(n)[:, None] + np.arange(mesh.order + 1) for n in elements]
+    directors = mesh.directors[node].copy()
+    directors[np.isin(np.repeat(list(order), counts), list(flip)), 0] *= -1
+    tables = "yarn length radius youngs_modulus poisson_ratio density electrical_conductivity thermal_conductivity"
+    per_fibril = {name: getattr(mesh, name)[list(order)] for name in tables.split()}
+    other = replace(
+        mesh,
+        position=mesh.position[node],
+        directors=directors,
+        xi=np.concatenate([np.linspace(0.0, mesh.length[f], n) for f, n in zip(order, counts, strict=True)]),
+        elements=np.concatenate([first[f] + within[f] for f in range(len(within))]),
+        first_node=first,
+        first_element=np.concatenate([[0], np.cumsum(elements)]),
+        **per_fibril,
+    )
+    return other, node
+
+
+def mirrored(mesh: FibrilMesh, axis: int) -> FibrilMesh:
+    """The mirror image; the second director changes sign, so that the frames stay right-handed."""
+    sign = np.ones(3)
+    sign[axis] = -1.0
+    directors = mesh.directors * sign
+    directors[:, 1] *= -1
+    return replace(mesh, position=mesh.position * sign, directors=directors)
+
+
+def reference_curve(mesh: FibrilMesh, r: Floats, fibril: int) -> CubicHermiteSpline:
+    """SciPy's cubic Hermite spline with the tangents that the contact curve should have."""
+    x = r[mesh.first_node[fibril] : mesh.first_node[fibril + 1]]
+    tangent = np.empty_like(x)
+    tangent[1:-1] = (x[2:] - x[:-2]) / 2
+    tangent[0] = (-3 * x[0] + 4 * x[1] - x[2]) / 2
+    tangent[-1] = (3 * x[-1] - 4 * x[-2] + x[-3]) / 2
+    return CubicHermiteSpline(np.arange(len(x)), x, tangent)
+
+
+def contact_term(
+    mesh: FibrilMesh, *, penalty: float = 5.0, per_element: int = 4, skin: float = 0.05
+) -> tuple[PenaltyContact, Floats]:
+    """The contact term of a mesh and the vector of unknowns of its initial configuration."""
+    space = beam_space(mesh)
+    term = PenaltyContact(mesh, space.slot, penalty=penalty, per_element=per_element, skin=skin)
+    return term, space.vector(initial_configuration(mesh))
+
+
+def small_cell(
+    rows: tuple[int, ...] = (1, 2), *, elements: int = 6, order: int = 2, **numerics: float | int
+) -> tuple[Design, FibrilMesh]:
+    """A cell of two by two yarns with few elements, and its mesh."""
+    design = plain_weave(yarns=2, rows=rows)
+    choice = replace(design.numerics, elements=elements, order=order, **{"section_degree": 3, **numerics})
+    design = replace(design, numerics=choice)
+    return design, build_mesh(design)

@@ -26,7 +26,7 @@ def frozen(cls: type[T]) -> type[T]:
     """
     inner = getattr(cls, "__post_init__", None)
 
-    def __post_init__(self: Any) -> None:
+    def lock(self: Any) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(value, np.ndarray) and value.flags.writeable:
@@ -36,7 +36,7 @@ def frozen(cls: type[T]) -> type[T]:
         if inner is not None:
             inner(self)
 
-    cls.__post_init__ = __post_init__  # type: ignore[attr-defined]
+    cls.__post_init__ = lock  # type: ignore[attr-defined]
     return dataclass(frozen=True, eq=False)(cls)
 
 

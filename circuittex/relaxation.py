@@ -41,9 +41,7 @@ def force_terms(mesh: FibrilMesh, design: Design) -> tuple[BeamSpace, Beam, Pena
     numerics = design.numerics
     space = beam_space(mesh)
     beam = Beam(space, degree=numerics.section_degree)
-    contact = PenaltyContact(
-        mesh, space.slot, penalty=design.contact.penalty, per_element=numerics.contact_points
-    )
+    contact = PenaltyContact(mesh, space.slot, penalty=design.contact.penalty, per_element=numerics.contact_points)
     return space, beam, contact
 
 

@@ -15,7 +15,7 @@ from circuittex.design import Design, design_hash
 from circuittex.export import simplified, write_netlists
 from circuittex.fields import solve_probes
 from circuittex.fit import fit_network
-from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.geometry.mesh import Floats
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.linear import LinearSolver, best_solver
@@ -94,9 +94,7 @@ def record_state(
         per_element=design.numerics.contact_points,
         conduction=design.electrical.conduction,
     )
-    fields = solve_probes(
-        contacts, design.terminals, design.probes, contact_heat=design.electrical.contact_heat
-    )
+    fields = solve_probes(contacts, design.terminals, design.probes, contact_heat=design.electrical.contact_heat)
     simple = simplified(design, contacts)
     fit = fit_network([f.currents[0] for f in fields], design)
     verification = verify(contacts, simple.contacts, design.terminals, design.probes, fields=fields)

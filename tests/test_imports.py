@@ -13,7 +13,7 @@ import pytest
 import circuittex
 
 PACKAGE = Path(circuittex.__file__).parent
-SHARED = {"frozen", "errors"}
+SHARED = {"frozen", "errors", "compiled"}
 
 # Stage -> the stages and modules it may import, besides SHARED and itself (docs/architecture.md). A dotted name
 # allows one module of a stage only; without a dot the whole stage is allowed.
@@ -23,6 +23,7 @@ ROUTES = {"fields", "circuit", "nodal", "netlist", "ngspice"}
 OUTPUTS = {"store", "summary", "report", "vtu"}
 ALLOWED: dict[str, set[str]] = {
     "frozen": set(),
+    "compiled": set(),
     "errors": set(),
     "options": set(),
     "units": set(),
@@ -42,6 +43,8 @@ ALLOWED: dict[str, set[str]] = {
     "ngspice": {"netlist", "geometry.mesh"},
     "fit": {"circuit", "nodal", "design", "geometry.mesh"},
     "verify": {*ROUTES, *STATE, "design", "spice_names"},
+    "verify_reduced": {"circuit", "design", "fit", "netlist", "ngspice"},
+    "export": {*STATE, "circuit", "contact.merge", "design", "fit", "netlist"},
     "results": RESULT_TYPES,
     "store": {*RESULT_TYPES, "results"},
     "tubes": {*RESULT_TYPES, "results"},
@@ -49,14 +52,17 @@ ALLOWED: dict[str, set[str]] = {
     "summary": {*RESULT_TYPES, "results"},
     "plot": {*RESULT_TYPES, "results", "tubes", "summary"},
     "report": {*RESULT_TYPES, "results", "summary", "plot"},
-    "study": {"design", "geometry", "mech", "contact", "relaxation", *ROUTES, "fit", "verify", "results", *OUTPUTS},
+    "study": {
+        *{"design", "geometry", "mech", "contact", "relaxation", "fields", "fit", "verify", "verify_reduced", "export"},
+        *{"results", *OUTPUTS},
+    },
 }
 ANYTHING = {"cli", "__main__"}  # the command line, which nobody imports
 
 # Libraries that take long to load or are not needed by everybody -> the only stages that know them.
 LIBRARIES: dict[str, set[str]] = {
     "skfem": {"mech", "fields"},
-    "numba": {"mech", "contact"},
+    "numba": {"compiled"},
     "pypardiso": {"mech"},
     "networkx": {"circuit"},
     "PySpice": {"pyspice_export"},

@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from circuittex.compiled import compiled
 from circuittex.contact.curve import evaluate
 
 MAX_STEPS = 60
 """Newton with bisection as its safeguard needs 4 or 5; bisection alone would need 52 for full precision."""
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _nearest_chord(r: Any, x: Any, first_node: int, first: int, last: int, bulge: Any, base: int, found: Any) -> float:
     """Best starting position among the chords first..last, and a lower bound of the distance to the curve.
 
@@ -39,7 +39,7 @@ def _nearest_chord(r: Any, x: Any, first_node: int, first: int, last: int, bulge
     return bound
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _closest(basis: Any, r: Any, window: Any, kind: Any, base: int, n: int, x: Any, s: float, work: Any) -> float:
     """Position of the closest point of a fibril of n intervals (the first is `base`) to x, starting from s.
 
@@ -72,7 +72,7 @@ def _closest(basis: Any, r: Any, window: Any, kind: Any, base: int, n: int, x: A
     return s
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def find_contacts(
     r: Any,
     radius: Any,

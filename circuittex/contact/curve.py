@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from circuittex.compiled import compiled
 from circuittex.errors import DesignError
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
@@ -61,7 +61,7 @@ def bezier(table: CurveTable, r: Floats) -> Floats:
     return np.asarray(np.einsum("bp,ipc->ibc", to_bezier, power))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def weights(basis: Any, t: float, order: int, c: Any) -> None:
     """Fill c (4,) with the weights of the window's nodes at t in [0, 1], or their first or second derivatives."""
     for a in range(4):
@@ -74,7 +74,7 @@ def weights(basis: Any, t: float, order: int, c: Any) -> None:
             c[a] = 2 * b[2] + 6 * t * b[3]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def evaluate(basis: Any, r: Any, window: int, t: float, order: int, c: Any, x: Any) -> None:
     """Fill x (3,) with the curve, or its derivative of the given order with respect to t."""
     weights(basis, t, order, c)

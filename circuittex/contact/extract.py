@@ -14,7 +14,12 @@ from circuittex.mech.space import BeamSpace, beam_space
 
 
 def contact_state(
-    mesh: FibrilMesh, configuration: Configuration, law: ContactLaw, *, per_element: int = 4, conduction: str = "reference"
+    mesh: FibrilMesh,
+    configuration: Configuration,
+    law: ContactLaw,
+    *,
+    per_element: int = 4,
+    conduction: str = "reference",
 ) -> ContactState:
     """The contact points of a configuration with their loads, Hertz widths and conductances.
 

@@ -14,13 +14,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from circuittex.compiled import compiled
 from circuittex.contact.curve import weights
 from circuittex.mech.pattern import find_neighbour
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _couple(r: Any, wa: int, wb: int, c: Any, cs: Any, css: Any, w: Any, n: Any, at_end: bool) -> tuple[float, float]:
     """Fill n (3,) and w (8, 3) of one contact; return the distance and 1 / m_ss (0 at a fibril's end)."""
     u, us, uss = np.zeros(3), np.zeros(3), np.zeros(3)
@@ -40,7 +40,7 @@ def _couple(r: Any, wa: int, wb: int, c: Any, cs: Any, css: Any, w: Any, n: Any,
     return d, 0.0 if at_end or m <= 0.0 else 1.0 / m
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def add_contacts(
     r: Any,
     slot: Any,

@@ -56,9 +56,7 @@ class PenaltyContact:
     candidates reach beyond touch so that they last several iterations.
     """
 
-    def __init__(
-        self, mesh: FibrilMesh, slot: Ints, *, penalty: float, per_element: int, skin: float = 0.05
-    ) -> None:
+    def __init__(self, mesh: FibrilMesh, slot: Ints, *, penalty: float, per_element: int, skin: float = 0.05) -> None:
         self.mesh, self.slot, self.penalty, self.skin = mesh, slot, penalty, skin
         self.table: CurveTable = curve_table(mesh)
         self.points = contact_points(mesh, per_element)
@@ -75,14 +73,17 @@ class PenaltyContact:
     def prepare(self, q: Floats) -> bool:
         """Renew the candidates once a Bézier point may have moved by half the skin."""
         r = self.positions(q)
-        if self._candidates is not None:
-            moved = np.sqrt(((r - self._built_at) ** 2).sum(axis=1).max())
-            if CONTROL_MOTION * moved <= self.skin / 2:
-                return False
+        if self._candidates is not None and self._valid(r):
+            return False
         self._candidates = find_candidates(self.table, r, self.mesh.radius, self.skin)
         self._built_at = r
         self._last = None
         return True
+
+    def _valid(self, r: Floats) -> bool:
+        """Whether the candidates still hold every pair in touch: no Bézier point has moved by half the skin."""
+        moved = float(((r - self._built_at) ** 2).sum(axis=1).max()) ** 0.5
+        return bool(CONTROL_MOTION * moved <= self.skin / 2)
 
     def pairs(self) -> tuple[Ints, Ints]:
         """Node pairs that the present candidates can couple, positions only."""
@@ -95,7 +96,10 @@ class PenaltyContact:
             return self._last[1]
         r = self.positions(q)
         candidates = self._candidates
-        if candidates is None or CONTROL_MOTION * np.sqrt(((r - self._built_at) ** 2).sum(axis=1).max()) > self.skin / 2:
+        if (
+            candidates is None
+            or CONTROL_MOTION * np.sqrt(((r - self._built_at) ** 2).sum(axis=1).max()) > self.skin / 2
+        ):
             candidates = find_candidates(self.table, r, self.mesh.radius, 0.0)
         found = _search(self.mesh, self.table, self.points, candidates, r)
         self._last = q.copy(), found

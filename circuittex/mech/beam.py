@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from circuittex.geometry.mesh import Floats, Ints
@@ -56,18 +58,19 @@ class Beam:
         full = self.space.element_slots[:, np.stack([i, j], axis=1)].reshape(-1, 2)
         return full, np.empty((0, 2), dtype=np.int64)
 
-    def _arguments(self, q: Floats) -> tuple[Floats | Ints, ...]:
+    def _arguments(self, q: Floats, weight: Floats) -> Any:
         space = self.space
-        return q.reshape(-1, DOFS), space.element_slots, space.shape, space.slope
+        x = q.reshape(-1, DOFS)
+        return x, space.element_slots, space.shape, space.slope, weight, self.L, self.mu, self.lam
 
     def energy(self, q: Floats) -> float:
         """Elastic energy, N mm; infinite where a section has turned inside out."""
-        return float(beam_energy(*self._arguments(q), self.weight, self.L, self.mu, self.lam))
+        return float(beam_energy(*self._arguments(q, self.weight)))
 
     def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats) -> float:
         """Add gradient and tangent in place; return the energy."""
         element = self._gradient, self._tangent
-        energy = beam_tangent(*self._arguments(q), self.weight, self.L, self.mu, self.lam, *element)
+        energy = beam_tangent(*self._arguments(q, self.weight), *element)
         add_elements(
             self.space.element_slots,
             *element,
@@ -84,11 +87,11 @@ class Beam:
     def section_force(self, q: Floats) -> Floats:
         """(M, 3) section force ∫ P E3 dA at mid-element, N."""
         force = np.empty((*self.space.weight.shape, 3))
-        section_force(*self._arguments(q), self.area, self.L, self.mu, self.lam, force)
+        section_force(*self._arguments(q, self.area), force)
         return np.asarray(force.mean(axis=1))
 
     def mass(self, pattern: Pattern) -> Floats:
-        """(nnz,) consistent mass matrix in the pattern, g (positions) and g mm2 (directors): rotary terms included [34]."""
+        """(nnz,) consistent mass matrix [34], rotary terms included: g for positions, g mm2 for directors."""
         mesh, fibril = self.space.mesh, self.space.mesh.element_fibril
         n = self.space.element_slots.shape[1]
         line = (mesh.density * mesh.area)[fibril]

@@ -14,12 +14,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from circuittex.compiled import compiled
 
 N_STRAINS = 5
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _strains(slots: Any, x: Any, shape: Any, slope: Any, u: Any) -> None:
     """Fill u (5, 3) with (g1, g2, r', g1', g2') from the nodal values x (slots, 9)."""
     u[:] = 0.0
@@ -33,7 +34,7 @@ def _strains(slots: Any, x: Any, shape: Any, slope: Any, u: Any) -> None:
             u[4, c] += slope[a] * row[6 + c]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _deformation(u: Any, L: Any, F: Any) -> float:
     """Fill F (3, 3) = sum_m u_m (x) L_m and return det F."""
     for c in range(3):
@@ -49,7 +50,7 @@ def _deformation(u: Any, L: Any, F: Any) -> float:
     )
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _push(F: Any, J: float, L: Any, y: Any) -> None:
     """Fill y (5, 3) with y_m = F^-T L_m, where (F^-T)_cj = (F^-1)_jc."""
     for c in range(3):
@@ -62,7 +63,7 @@ def _push(F: Any, J: float, L: Any, y: Any) -> None:
             y[m, c] = total / J
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def beam_energy(x: Any, slots: Any, shape: Any, slope: Any, weight: Any, L: Any, mu: Any, lam: Any) -> float:
     """Elastic energy, N mm; infinite where a section point has turned inside out.
 
@@ -88,7 +89,7 @@ def beam_energy(x: Any, slots: Any, shape: Any, slope: Any, weight: Any, L: Any,
     return energy
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _point(u: Any, L: Any, w: float, mu: float, lam: float, F: Any, y: Any, g: Any, H: Any) -> float:
     """Add one section point to g (5, 3) and H (5, 3, 5, 3); return its energy."""
     J = _deformation(u, L, F)
@@ -115,7 +116,7 @@ def _point(u: Any, L: Any, w: float, mu: float, lam: float, F: Any, y: Any, g: A
     return w * (mu * (0.5 * norm - log_j) + 0.5 * lam * log_j * log_j)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def beam_tangent(
     x: Any, slots: Any, shape: Any, slope: Any, weight: Any, L: Any, mu: Any, lam: Any, gradient: Any, tangent: Any
 ) -> float:
@@ -157,7 +158,7 @@ def beam_tangent(
     return energy
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def section_force(x: Any, slots: Any, shape: Any, slope: Any, area: Any, L: Any, mu: Any, lam: Any, force: Any) -> None:
     """Fill force (M, Q, 3) with the section force dE/dr' = ∫ P E3 dA, N; area (M, Q, S) section weights, mm2."""
     u, F, y = np.empty((N_STRAINS, 3)), np.empty((3, 3)), np.empty((N_STRAINS, 3))

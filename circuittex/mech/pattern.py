@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from circuittex.compiled import compiled
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import Floats, Ints
 from circuittex.mech.space import DOFS
@@ -79,7 +79,7 @@ def _offsets(width: Ints, start: Ints) -> Ints:
     return total[:-1] - np.repeat(total[start[:-1]], np.diff(start))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _fill_indices(indptr: Any, start: Any, neighbour: Any, full: Any, indices: Any) -> None:
     for a in range(start.shape[0] - 1):
         for k in range(9):
@@ -94,7 +94,7 @@ def _fill_indices(indptr: Any, start: Any, neighbour: Any, full: Any, indices: A
                     at += 1
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def find_neighbour(start: Any, neighbour: Any, a: int, b: int) -> int:
     """Index of slot b among the neighbours of slot a < b, by bisection."""
     low, high = start[a], start[a + 1]
@@ -107,7 +107,7 @@ def find_neighbour(start: Any, neighbour: Any, a: int, b: int) -> int:
     return low
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def add_elements(
     slots: Any,
     gradient: Any,

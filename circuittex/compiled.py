@@ -1,0 +1,16 @@
+"""The decorator of compiled functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from numba import njit
+
+F = TypeVar("F", bound=Callable[..., object])
+
+
+def compiled(function: F) -> F:
+    """Compile `function` with numba: kept on disk between runs, and free to run beside other threads."""
+    kernel: F = njit(cache=True, nogil=True)(function)
+    return kernel

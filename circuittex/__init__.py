@@ -20,6 +20,7 @@ _HOMES = {
     "nodal": ("solve_nodal",),
     "netlist": ("Header", "deck", "subcircuit", "to_pyspice"),
     "fit": ("fit_network",),
+    "relaxation": ("relax",),
     "study": ("run_study",),
     "results": ("Record", "Study"),
     "store": ("load_study",),
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
     from circuittex.netlist import subcircuit as subcircuit
     from circuittex.netlist import to_pyspice as to_pyspice
     from circuittex.nodal import solve_nodal as solve_nodal
+    from circuittex.relaxation import relax as relax
     from circuittex.results import Record as Record
     from circuittex.results import Study as Study
     from circuittex.store import load_study as load_study

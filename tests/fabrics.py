@@ -82,19 +82,26 @@ def tangle(
     fibrils: int = 6,
     elements: int = 8,
     order: int = 1,
-    size: float = 1.0,
-    wave: float = 0.15,
+    bend: float = 0.8,
     noise: float = 0.0,
     radius: ArrayLike = 0.15,
 ) -> FibrilMesh:
-    """Random bent fibrils that cross in a box of the given size: waves of amplitude `wave` and `noise` on each node."""
+    """Random fibrils, 0.5 to 5 mm long, that cross one another: waves of curvature up to `bend` (1/mm).
+
+    As long as the radius of curvature exceeds R + R' a point in contact has one closest point on a fibril.
+    `noise` (mm) on each node takes that away.
+    """
     rng = np.random.default_rng(seed)
     lines = []
     for _ in range(fibrils):
-        start, stop = rng.uniform(-size, size, (2, 3))
-        line = straight(start, stop + np.array([2.5 * size, 0, 0]), elements, order)
+        start, stop = rng.uniform(-1, 1, (2, 3))
+        stop[0] += 2.5
+        length, half_waves = np.linalg.norm(stop - start), rng.uniform(1, 3)
+        across = np.cross(stop - start, rng.normal(size=3))
+        size = rng.uniform(0, bend) * (length / (half_waves * np.pi)) ** 2
+        line = straight(start, stop, elements, order)
         t = np.linspace(0.0, 1.0, len(line))[:, None]
-        line += wave * rng.normal(size=3) * np.sin(np.pi * rng.uniform(1, 3) * t + rng.uniform(0, 6))
+        line += size * across / np.linalg.norm(across) * np.sin(half_waves * np.pi * t + rng.uniform(0, 6))
         lines.append(line + noise * rng.normal(size=line.shape))
     return fibrils_through(lines, order=order, radius=radius)
 
@@ -160,6 +167,6 @@ def small_cell(
 ) -> tuple[Design, FibrilMesh]:
     """A cell of two by two yarns with few elements, and its mesh."""
     design = plain_weave(yarns=2, rows=rows)
-    choice = replace(design.numerics, elements=elements, order=order, **{"section_degree": 3, **numerics})
+    choice = replace(design.numerics, elements=elements, order=order, **numerics)
     design = replace(design, numerics=choice)
     return design, build_mesh(design)

@@ -124,7 +124,7 @@ def test_touching_points_are_the_closest_of_the_whole_fibril(seed: int, order: i
     mesh = tangle(seed, fibrils=3, elements=8 // order, order=order, radius=0.3)
     term, q = contact_term(mesh, per_element=2)
     found, table, r = term.touching(q), term.table, term.positions(q)
-    seen = {}
+    seen = set()
     for i in range(len(found.overlap)):
         a, g = found.interval_a[i], found.fibril_b[i]
         f = table.fibril[a]
@@ -133,7 +133,7 @@ def test_touching_points_are_the_closest_of_the_whole_fibril(seed: int, order: i
         assert found.overlap[i] == pytest.approx(0.6 - distance, abs=1e-11)
         # The distance is flat at its minimum: the search's xatol, not round-off, limits the position.
         assert found.position_b[i] == pytest.approx(at, abs=1e-5)
-        seen[a, round(float(found.t_a[i]), 6), g] = True
+        seen.add((a, found.t_a[i], g))
     assert len(seen) == count_touching(mesh, r, table, term.points, 0.6)
 
 

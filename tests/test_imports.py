@@ -64,6 +64,7 @@ LIBRARIES: dict[str, set[str]] = {
     "skfem": {"mech", "fields"},
     "numba": {"compiled"},
     "pypardiso": {"mech"},
+    "cvxopt": {"mech"},
     "networkx": {"circuit"},
     "PySpice": {"pyspice_export"},
     "h5py": {"store"},

@@ -40,7 +40,7 @@ class Beam:
         self.L = _strain_matrix(points)[:, None] * np.ones((1, space.weight.shape[1], 1, 1, 1))
         if natural is not None:
             self.L, jacobian = _referred(self.L, space, natural)
-            self.weight = self.weight * jacobian
+            self.area, self.weight = self.area * jacobian, self.weight * jacobian
         elif np.ptp(mesh.radius) == 0:
             self.L = self.L[:1]
         n = space.element_slots.shape[1]
@@ -58,10 +58,10 @@ class Beam:
         full = self.space.element_slots[:, np.stack([i, j], axis=1)].reshape(-1, 2)
         return full, np.empty((0, 2), dtype=np.int64)
 
-    def _arguments(self, q: Floats, weight: Floats) -> Any:
+    def _arguments(self, q: Floats, weight: Floats, *out: Floats) -> tuple[Any, ...]:
         space = self.space
         x = q.reshape(-1, DOFS)
-        return x, space.element_slots, space.shape, space.slope, weight, self.L, self.mu, self.lam
+        return x, space.element_slots, space.shape, space.slope, weight, self.L, self.mu, self.lam, *out
 
     def energy(self, q: Floats) -> float:
         """Elastic energy, N mm; infinite where a section has turned inside out."""
@@ -70,7 +70,7 @@ class Beam:
     def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats) -> float:
         """Add gradient and tangent in place; return the energy."""
         element = self._gradient, self._tangent
-        energy = beam_tangent(*self._arguments(q, self.weight), *element)
+        energy = beam_tangent(*self._arguments(q, self.weight, *element))
         add_elements(
             self.space.element_slots,
             *element,
@@ -87,7 +87,7 @@ class Beam:
     def section_force(self, q: Floats) -> Floats:
         """(M, 3) section force ∫ P E3 dA at mid-element, N."""
         force = np.empty((*self.space.weight.shape, 3))
-        section_force(*self._arguments(q, self.area), force)
+        section_force(*self._arguments(q, self.area, force))
         return np.asarray(force.mean(axis=1))
 
     def mass(self, pattern: Pattern) -> Floats:

@@ -167,8 +167,7 @@ def march(
 
     Raises `ConvergenceError` where a step is not solved in `max_iterations`.
     """
-    if not 0.0 < dt < np.inf:
-        raise DesignError("dt", dt, "the time step must be a positive number of seconds")
+    _check_positive(dt=dt)
     inertia = Inertia(mass, damping, dt)
     free = np.ones(len(q), dtype=bool)
     free[fixed] = False
@@ -233,10 +232,9 @@ def relax_dynamically(
     Raises `ConvergenceError`, with the history, where that takes longer than `t_relax` seconds or where a
     step is not solved in `max_iterations`.
     """
-    if (velocity is None) != (t_step == 0.0) or t_step < 0.0:
+    _check_positive(dt=dt, t_relax=t_relax)
+    if (velocity is None) != (t_step == 0.0) or not 0.0 <= t_step < np.inf:
         raise DesignError("t_step", t_step, "it must be positive with a velocity, 0 s without")
-    if not 0.0 < t_relax < np.inf:
-        raise DesignError("t_relax", t_relax, "it must be a positive number of seconds")
     motion = partial(
         march,
         terms,
@@ -264,6 +262,12 @@ def relax_dynamically(
             )
     message = f"not at rest after {t_relax:.3g} s of damped motion: the largest free force is"
     raise ConvergenceError(f"{message} {past[-1].residual:.3g} N, {tolerance:.3g} N was asked for", _history(past))
+
+
+def _check_positive(**times: float) -> None:
+    for name, time in times.items():
+        if not 0.0 < time < np.inf:
+            raise DesignError(name, time, "it must be a positive number of seconds")
 
 
 def _undamped(pattern: Pattern) -> Floats:

@@ -1,0 +1,67 @@
+"""Mesh study: the relaxed and the once stretched paper cell with 10, 20 and 40 elements a fibril.
+
+    python benchmarks/mesh_study.py [--parameters paper-code] [--elements 10 20 40]
+
+Prints a Markdown table of clamp forces, probe currents, Ry and Rc, and the time each mesh takes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from circuittex.contact.extract import contact_state
+from circuittex.design import Design, plain_weave
+from circuittex.fields import solve_probes
+from circuittex.fit import fit_network
+from circuittex.geometry.weave import build_mesh
+from circuittex.relaxation import Equilibrium, clamp_force, move, relax
+
+STRETCH = 1.025
+
+
+def rows(design: Design) -> list[str]:
+    """One table row for the relaxed state and one for a stretch of 2.5 %."""
+    mesh, start = build_mesh(design), None
+    found = []
+    for stretch in (1.0, STRETCH):
+        clock = time.perf_counter()
+        state: Equilibrium = relax(mesh, design, start)
+        seconds = time.perf_counter() - clock
+        contacts = contact_state(
+            mesh, state.configuration, design.contact, per_element=design.numerics.contact_points
+        )
+        currents = [f.currents[0] for f in solve_probes(contacts, design.terminals, design.probes)]
+        fit = fit_network(currents, design)
+        force = clamp_force(mesh, state.reaction)
+        cells = [design.numerics.elements, f"{100 * (stretch - 1):.1f} %", f"{force[0, 0]:.5f}", f"{force[1, 1]:.5f}"]
+        cells += [*(f"{current:.6f}" for current in currents), f"{fit.Ry:.5f}", f"{fit.Rc:.2f}"]
+        cells += [state.iterations, f"{state.residual:.0e}", f"{seconds:.0f}"]
+        found.append("| " + " | ".join(map(str, cells)) + " |")
+        start = move(state.configuration, np.eye(2), np.diag([STRETCH, 1.0]))
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--parameters", default="paper-code", choices=["paper-code", "paper-table"])
+    parser.add_argument("--elements", type=int, nargs="+", default=[10, 20, 40])
+    parser.add_argument("--points", type=int, default=4, help="contact points of an element")
+    parser.add_argument("--degree", type=int, default=7, help="degree of the section's rule")
+    options = parser.parse_args()
+    print("| elements | stretch | Fx N | Fy N | I1 A | I2 A | I3 A | Ry ohm | Rc ohm | iterations | residual N | s |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|---|")
+    base = plain_weave(options.parameters)
+    for elements in options.elements:
+        numerics = replace(
+            base.numerics, elements=elements, contact_points=options.points, section_degree=options.degree
+        )
+        for row in rows(replace(base, numerics=numerics)):
+            print(row, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -31,9 +31,7 @@ def rows(design: Design) -> list[str]:
         clock = time.perf_counter()
         state: Equilibrium = relax(mesh, design, start)
         seconds = time.perf_counter() - clock
-        contacts = contact_state(
-            mesh, state.configuration, design.contact, per_element=design.numerics.contact_points
-        )
+        contacts = contact_state(mesh, state.configuration, design.contact, per_element=design.numerics.contact_points)
         currents = [f.currents[0] for f in solve_probes(contacts, design.terminals, design.probes)]
         fit = fit_network(currents, design)
         force = clamp_force(mesh, state.reaction)

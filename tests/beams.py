@@ -76,7 +76,7 @@ class DeadLoad:
     def energy(self, q: Floats) -> float:
         return float(-self.force @ q)
 
-    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats) -> float:
+    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
         gradient -= self.force
         return self.energy(q)
 
@@ -119,7 +119,7 @@ def assembled(beam: Beam, q: Floats) -> tuple[float, Floats, Pattern, Floats]:
     """Energy, gradient (n_dofs,), pattern and tangent values of the beam term alone."""
     pattern = build_pattern(beam.space.mesh.n_nodes, *beam.pairs())
     gradient, data = np.zeros(len(q)), np.zeros(pattern.nnz)
-    return beam.assemble(q, pattern, gradient, data), gradient, pattern, data
+    return beam.assemble(q, pattern, gradient, data, np.zeros(pattern.nnz)), gradient, pattern, data
 
 
 def dense(pattern: Pattern, data: Floats) -> Floats:

@@ -22,7 +22,9 @@ def assembled(term: PenaltyContact, q: Floats) -> tuple[float, Floats, Pattern, 
     term.prepare(q)
     pattern = build_pattern(len(q) // 9, *term.pairs())
     gradient, data = np.zeros(len(q)), np.zeros(pattern.nnz)
-    return term.assemble(q, pattern, gradient, data), gradient, pattern, data
+    softening = np.zeros(pattern.nnz)
+    energy = term.assemble(q, pattern, gradient, data, softening)
+    return energy, gradient, pattern, data + softening
 
 
 def forces(mesh: FibrilMesh, per_element: int = 4) -> tuple[float, Floats]:

@@ -60,13 +60,17 @@ def add_contacts(
     point_offset: Any,
     total: Any,
     data: Any,
+    softening: Any,
 ) -> None:
     """Add the gradient and the tangent's upper triangle of every contact (C) in place.
+
+    The tangent's first part, P w_q c_i c_j n n^T, goes to data; the rest, by which the contact force turns as
+    fibrils slide, goes to softening.
 
     stiffness (C,): P* times quadrature weight, N/mm; the matrix arguments are those of `Pattern`.
     """
     c, cs, css = np.zeros(8), np.zeros(8), np.zeros(8)
-    w, n, block = np.empty((8, 3)), np.empty(3), np.empty((3, 3))
+    w, n, normal, turning = np.empty((8, 3)), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     for q in range(overlap.shape[0]):
         weights(basis[kind_a[q]], t_a[q], 0, c[:4])
         for order, out in ((0, c), (1, cs), (2, css)):
@@ -87,13 +91,15 @@ def add_contacts(
                 cc = c[i] * c[j]
                 for k in range(3):
                     for m in range(3):
-                        block[k, m] = (stiff + lean) * cc * n[k] * n[m] + lean * over_m * w[i, k] * w[j, m]
-                    block[k, k] -= lean * cc
+                        normal[k, m] = stiff * cc * n[k] * n[m]
+                        turning[k, m] = lean * (cc * n[k] * n[m] + over_m * w[i, k] * w[j, m])
+                    turning[k, k] -= lean * cc
                 if i == j:
                     for k in range(3):
                         at = indptr[9 * slot_i + k]
                         for m in range(k, 3):
-                            data[at + m - k] += block[k, m]
+                            data[at + m - k] += normal[k, m]
+                            softening[at + m - k] += turning[k, m]
                     continue
                 slot_j = slot[window_a[q] + j if j < 4 else window_b[q] + j - 4]
                 low, high = min(slot_i, slot_j), max(slot_i, slot_j)
@@ -101,4 +107,5 @@ def add_contacts(
                 for k in range(3):
                     row = indptr[9 * low + k] + 9 - k + at
                     for m in range(3):
-                        data[row + m] += block[k, m] if slot_i < slot_j else block[m, k]
+                        data[row + m] += normal[k, m]  # n n^T is its own transpose
+                        softening[row + m] += turning[k, m] if slot_i < slot_j else turning[m, k]

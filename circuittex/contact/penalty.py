@@ -111,8 +111,8 @@ class PenaltyContact:
         weight = self.weight[self.table.fibril[found.interval_a]]
         return float(0.5 * self.penalty * np.sum(weight * found.overlap**2))
 
-    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats) -> float:
-        """Add gradient and tangent in place; return the energy."""
+    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
+        """Add gradient and tangent in place, the turning of the contact force to `softening`; return the energy."""
         found, table = self.touching(q), self.table
         last = table.first_interval[found.fibril_b + 1] - table.first_interval[found.fibril_b]
         k = np.minimum(found.position_b.astype(np.int64), last - 1)
@@ -137,6 +137,7 @@ class PenaltyContact:
             pattern.point_offset,
             gradient,
             data,
+            softening,
         )
         return float(0.5 * self.penalty * np.sum(weight * found.overlap**2))
 

@@ -22,7 +22,7 @@ class Beam:
     that of the section's rule (`disk_rule`).
     """
 
-    def __init__(self, space: BeamSpace, *, degree: int = 3, natural: Configuration | None = None) -> None:
+    def __init__(self, space: BeamSpace, *, degree: int = 7, natural: Configuration | None = None) -> None:
         mesh, fibril = space.mesh, space.mesh.element_fibril
         mu, lam = lame(mesh.youngs_modulus, mesh.poisson_ratio)
         lam_b = bending_lambda(mu, mesh.poisson_ratio)
@@ -67,8 +67,8 @@ class Beam:
         """Elastic energy, N mm; infinite where a section has turned inside out."""
         return float(beam_energy(*self._arguments(q, self.weight)))
 
-    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats) -> float:
-        """Add gradient and tangent in place; return the energy."""
+    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
+        """Add gradient and tangent in place, nothing to `softening`; return the energy."""
         element = self._gradient, self._tangent
         energy = beam_tangent(*self._arguments(q, self.weight, *element))
         add_elements(

@@ -137,7 +137,7 @@ class Inertia:
         assert self._pattern is not None, "assemble comes first"
         return float(0.5 * velocity @ multiply(self._pattern, self._mass, velocity))
 
-    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats) -> float:
+    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
         """Add gradient and tangent in place; return the incremental potential."""
         if pattern is not self._pattern:
             self._pattern = pattern

@@ -183,4 +183,5 @@ def section_force(x: Any, slots: Any, shape: Any, slope: Any, area: Any, L: Any,
             g[:] = 0.0
             for s in range(area.shape[2]):
                 _point(u, L[block, q, s], area[e, q, s], mu[e, s], lam[e, s], F, y, g, H)
-            force[e, q] = g[2]
+            for c in range(3):  # assigning the row would cost numba 4 s more to compile
+                force[e, q, c] = g[2, c]

@@ -20,5 +20,9 @@ class ForceTerm(Protocol):
     def energy(self, q: Floats) -> float:
         """The potential, N mm; infinite where q is impossible."""
 
-    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats) -> float:
-        """Add the gradient (N) and the tangent's upper triangle (N/mm) in place; return the potential."""
+    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
+        """Add the gradient (N) and the tangent's upper triangle (N/mm) in place; return the potential.
+
+        The tangent is `data` + `softening`: the latter takes the part that a descent far from equilibrium may
+        leave out where it makes the tangent indefinite.
+        """

@@ -56,7 +56,7 @@ class PenaltyContact:
     candidates reach beyond touch so that they last several iterations.
     """
 
-    def __init__(self, mesh: FibrilMesh, slot: Ints, *, penalty: float, per_element: int, skin: float = 0.05) -> None:
+    def __init__(self, mesh: FibrilMesh, slot: Ints, *, penalty: float, per_element: int, skin: float = 0.08) -> None:
         self.mesh, self.slot, self.penalty, self.skin = mesh, slot, penalty, skin
         self.table: CurveTable = curve_table(mesh)
         self.points = contact_points(mesh, per_element)

@@ -112,7 +112,7 @@ def minimise(
     unconverged state is never returned.
     """
     system = _System(terms, mass, fixed, len(q))
-    shift, step, history = FIRST_SHIFT, 1.0, []
+    shift, part, step, history = FIRST_SHIFT, 0, 1.0, []
     free = np.ones(len(q), dtype=bool)
     free[fixed] = False
     for iteration in range(max_iterations + 1):
@@ -127,7 +127,7 @@ def minimise(
             return Minimum(q, gradient, energy, residual, iteration, np.array(history))
         if iteration == max_iterations:
             break
-        shift, solve = _positive(system, solver, shift, history)
+        shift, part, solve = _positive(system, solver, shift, part, history)
         force = np.where(free, gradient, 0.0)
         direction = solve(-force)
         step = _search(system, q, direction, energy, float(force @ direction))
@@ -143,14 +143,19 @@ def minimise(
 
 
 def _positive(
-    system: _System, solver: LinearSolver, shift: float, history: list[tuple[float, float, float, float]]
-) -> tuple[float, Solve]:
-    """The tangent made positive definite, with less of its softening part or else a larger shift, and its factor."""
+    system: _System, solver: LinearSolver, shift: float, part: int, history: list[tuple[float, float, float, float]]
+) -> tuple[float, int, Solve]:
+    """The tangent made positive definite with less of its softening or else a larger shift: shift, part, factor.
+
+    `part` is the place in `SOFTENING` that served last; the search starts one place before it, since a
+    factorisation that fails costs nearly as much as one that succeeds.
+    """
+    first = max(0, part - 1)
     while shift <= LARGEST_SHIFT:
-        for softening in SOFTENING:
-            solve = system.factor(solver, shift, softening)
+        for trial in range(first, len(SOFTENING)):
+            solve = system.factor(solver, shift, SOFTENING[trial])
             if solve is not None:
-                return shift, solve
+                return shift, trial, solve
         shift = max(4 * shift, FIRST_SHIFT)
     raise ConvergenceError("the tangent stays indefinite under any shift", np.array(history))
 

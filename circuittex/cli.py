@@ -8,7 +8,6 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
@@ -16,7 +15,6 @@ from circuittex.errors import CircuittexError, DesignError, StoreError
 from circuittex.options import build_parser
 
 if TYPE_CHECKING:
-    from circuittex.contact.merge import Simplified
     from circuittex.design import Design, Probe
     from circuittex.results import Record, Study
 
@@ -77,55 +75,31 @@ def _run(options: argparse.Namespace) -> int:
 def _netlist(options: argparse.Namespace) -> int:
     study = _load(options.results)
     (record,) = _select(study, options.state)
-    text, resistors = _netlist_text(study, record, options)
+    text = _netlist_text(study, record, options)
     if options.out is None:
         print(text, end="")
     else:
         options.out.write_text(text, encoding="ascii")
     from circuittex.ngspice import estimated_seconds, feasible
 
+    resistors = text.count("\nR")
     if not feasible(resistors):
         seconds = estimated_seconds(resistors)
         print(f"circuittex: note: {resistors} resistors may take ngspice {seconds:.0f} s or more", file=sys.stderr)
     return 0
 
 
-def _netlist_text(study: Study, record: Record, options: argparse.Namespace) -> tuple[str, int]:
-    """The netlist that the options ask for, and its number of resistors."""
-    from circuittex.circuit import build_circuit, reduced_circuit, yarn_end_terminals
-    from circuittex.netlist import Header, deck, subcircuit
+def _netlist_text(study: Study, record: Record, options: argparse.Namespace) -> str:
+    """The netlist that the options ask for."""
+    from circuittex.export import detailed_netlist, probe_netlist, reduced_netlist, simplified
 
     design = study.design
-    header = partial(Header, design=design.name, design_hash=study.design_hash, state=record.name)
     if options.kind == "reduced":
-        circuit = reduced_circuit((len(design.weave.warp), len(design.weave.weft)), record.fit.Ry, record.fit.Rc)
-        return subcircuit(circuit, f"{record.name} reduced", header("reduced network")), circuit.n_resistors
-    merge_length = design.numerics.merge_length if options.resolution == "merged" else 0.0
-    simple = _simplified(study, record, merge_length)
-    notes = (f"contact points added to others within {merge_length:g} mm: {simple.merged_contacts}",)
+        return reduced_netlist(design, record.name, record.fit)
+    simple = simplified(design, record.contacts, merge_length=None if options.resolution == "merged" else 0.0)
     if options.kind == "subckt":
-        circuit = build_circuit(
-            simple.contacts, yarn_end_terminals(study.mesh), dropped_contacts=simple.dropped_contacts
-        )
-        return subcircuit(circuit, record.name, header("detailed network", notes=notes)), circuit.n_resistors
-    probe = _probe(design, options.probe)
-    terminals = [terminal for terminal in design.terminals if terminal.name in (probe.source, probe.sink)]
-    circuit = build_circuit(simple.contacts, terminals, dropped_contacts=simple.dropped_contacts)
-    drive = {probe.source: probe.voltage, probe.sink: 0.0}
-    return deck(circuit, drive, header(f"detailed network, probe {probe.name}", notes=notes)), circuit.n_resistors
-
-
-def _simplified(study: Study, record: Record, merge_length: float) -> Simplified:
-    """The record's contacts as the design wants them in netlists, but for the merge length."""
-    from circuittex.contact.merge import simplify
-
-    numerics = study.design.numerics
-    return simplify(
-        record.contacts,
-        merge_length=merge_length,
-        snap_length=numerics.snap_length,
-        drop_fraction=numerics.drop_fraction,
-    )
+        return detailed_netlist(design, record.name, simple)
+    return probe_netlist(design, record.name, simple, _probe(design, options.probe))
 
 
 def _probe(design: Design, name: str | None) -> Probe:
@@ -139,13 +113,14 @@ def _probe(design: Design, name: str | None) -> Probe:
 def _verify(options: argparse.Namespace) -> int:
     study = _load(options.results)
     records = _select(study, options.state)
+    from circuittex.export import simplified
     from circuittex.verify import AGREEMENT, verify
 
     design = study.design
     agree = True
     print(f"{'state':<20} {'V per V':>8} {'current':>8} {'merging':>8} {'mesh':>8}  routes")
     for record in records:
-        simple = _simplified(study, record, design.numerics.merge_length)
+        simple = simplified(design, record.contacts)
         check = verify(record.contacts, simple.contacts, design.terminals, design.probes)
         differences = check.max_voltage_difference, check.max_current_difference
         agree &= check.ngspice_checked and all(difference <= AGREEMENT for difference in differences)

@@ -35,6 +35,7 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
     ``verification``
         ``routes``: the routes that answered; ``max_voltage_difference_V``: the largest difference of two routes in a
         node voltage, V per volt of the probe; ``max_current_difference``: in a terminal current, relative;
+        ``reduced_difference``: of the reduced network's currents between the fit and ngspice, relative;
         ``merge_error``: largest relative change of a probe current by merging contacts; ``field_difference``: largest
         relative difference of a probe current between the mechanical mesh and the circuit; ``ngspice_checked``: whether
         ngspice confirmed the state; ``note``: why it did not
@@ -147,6 +148,7 @@ def _state(record: Record) -> dict[str, Any]:
             "routes": verification.routes,
             "max_voltage_difference_V": verification.max_voltage_difference,
             "max_current_difference": verification.max_current_difference,
+            "reduced_difference": record.reduced_difference,
             "merge_error": verification.merge_error,
             "field_difference": verification.field_difference,
             "ngspice_checked": verification.ngspice_checked,

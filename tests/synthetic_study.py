@@ -89,6 +89,7 @@ def _record(
             warnings=(),
             currents=np.array([0.884, 0.0066, 0.0078]),
         ),
+        reduced_difference=3e-12,
         verification=Verification(
             routes=("fields", "nodal", "ngspice"),
             max_voltage_difference=4e-13,

@@ -175,7 +175,7 @@ BAD: list[tuple[list[tuple[Keys, Any]], str, str]] = [
     ([(("numerics", "order"), 3)], "numerics.order", "from 1 to 2"),
     ([(("numerics", "order"), "2")], "numerics.order", "whole number"),
     ([(("numerics", "contact_points"), 0)], "numerics.contact_points", "from 1 to 20"),
-    ([(("numerics", "section_degree"), 1)], "numerics.section_degree", "from 2"),
+    ([(("numerics", "section_degree"), 3)], "numerics.section_degree", "from 6"),
     ([(("numerics", "tolerance"), 0)], "numerics.tolerance", "> 0 N"),
     ([(("numerics", "max_iterations"), 0)], "numerics.max_iterations", "from 1"),
     ([(("numerics", "merge_length"), -1)], "numerics.merge_length", ">= 0 mm"),

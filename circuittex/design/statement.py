@@ -51,7 +51,8 @@ class Numerics:
     contact_points: int = 4
     """Contact points of each element, on either side."""
     section_degree: int = 7
-    """Degree of the section's quadrature rule."""
+    """Degree of the section's quadrature rule. Below 6 its points tell how a fibril is spun about its axis, which
+    a round fibril does not know, and the relaxation creeps along that spin."""
     tolerance: float = 1e-6
     """Largest free force at equilibrium, N."""
     max_iterations: int = 200
@@ -70,7 +71,7 @@ class Numerics:
             elements=whole(self.elements, f"{at}.elements", 2, 10_000),
             order=whole(self.order, f"{at}.order", 1, 2),
             contact_points=whole(self.contact_points, f"{at}.contact_points", 1, 20),
-            section_degree=whole(self.section_degree, f"{at}.section_degree", 2, 15),
+            section_degree=whole(self.section_degree, f"{at}.section_degree", 6, 15),
             tolerance=real(self.tolerance, f"{at}.tolerance", "N", above=0),
             max_iterations=whole(self.max_iterations, f"{at}.max_iterations", 1, 100_000),
             merge_length=real(self.merge_length, f"{at}.merge_length", "mm", at_least=0),

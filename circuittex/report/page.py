@@ -167,7 +167,7 @@ def _verification(study: Study) -> str:
     if not study.records:
         return ""
     head = ["state", "routes", "voltages (V per V)", "currents (relative)"]
-    head += ["merging", "mechanical mesh", "ngspice", "time (s)"]
+    head += ["reduced network", "merging", "mechanical mesh", "ngspice", "time (s)"]
     return _table(head, [_verification_row(record) for record in study.records])
 
 
@@ -178,6 +178,7 @@ def _verification_row(record: Record) -> list[str]:
         ", ".join(check.routes),
         f"{check.max_voltage_difference:.1e}",
         f"{check.max_current_difference:.1e}",
+        _number(record.reduced_difference, 2),
         _number(check.merge_error, 2),
         _number(check.field_difference, 2),
         "checked" if check.ngspice_checked else f"NOT CHECKED {check.note}".strip(),

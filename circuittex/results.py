@@ -47,6 +47,11 @@ class Record:
     ngspice did not check it."""
     verification: Verification
     """How the routes to the currents and voltages agree."""
+    field_convergence: Floats
+    """(3, 2) node distance in mm and largest relative current error of the field on the mechanical mesh and on two
+    refinements of it, against the circuit; (0, 2) where it was not studied."""
+    levels: int
+    """Levels in which the fibrils of the centre warp yarn lie at its centre crossing."""
     netlist: str
     """Path of the detailed sub-circuit, relative to the results folder."""
 

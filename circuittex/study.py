@@ -15,6 +15,7 @@ from circuittex.design import Design, design_hash
 from circuittex.export import simplified, write_netlists
 from circuittex.fields import solve_probes
 from circuittex.fit import fit_network
+from circuittex.geometry.levels import levels
 from circuittex.geometry.mesh import Floats
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
@@ -24,7 +25,7 @@ from circuittex.report import write_report
 from circuittex.results import Record, Study
 from circuittex.store import append_record, write_study_start
 from circuittex.summary import write_summary
-from circuittex.verify import verify
+from circuittex.verify import field_convergence, verify
 from circuittex.verify_reduced import verify_reduced
 from circuittex.vtu import write_collections, write_vtu
 
@@ -98,6 +99,7 @@ def record_state(
     simple = simplified(design, contacts)
     fit = fit_network([f.currents[0] for f in fields], design)
     verification = verify(contacts, simple.contacts, design.terminals, design.probes, fields=fields)
+    convergence = np.empty((0, 2)) if path else field_convergence(contacts, design.terminals, design.probes, fields)
     netlist = ""
     if folder is not None:
         netlist = write_netlists(folder / "netlists", design, name, simple, fit).relative_to(folder).as_posix()
@@ -117,6 +119,8 @@ def record_state(
         fit=fit,
         reduced_difference=verify_reduced(design, fit),
         verification=verification,
+        field_convergence=convergence,
+        levels=levels(mesh, equilibrium.configuration.r, *centre_crossing(design)),
         netlist=netlist,
     )
 
@@ -155,6 +159,13 @@ def state_names(loading: str, strains: tuple[float, ...]) -> tuple[str, ...]:
         seen[name] += 1
         names.append(name if seen[name] == 1 else f"{name}-{seen[name]}")
     return tuple(names)
+
+
+def centre_crossing(design: Design) -> tuple[int, float]:
+    """The warp yarn nearest the centre, from below, and where along it (mm) it crosses the weft yarn nearest the centre."""
+    weave = design.weave
+    weft = (len(weave.weft) - 1) // 2
+    return (len(weave.warp) - 1) // 2, (weft - (len(weave.weft) - 1) / 2) * weave.pitch
 
 
 def _made(folder: Path) -> Path:

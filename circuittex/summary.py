@@ -28,8 +28,9 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
         current of each probe, and the largest temperature rise over all probes
     ``Ry_ohm``, ``Rc_ohm``, ``fit_residual``, ``fit_warnings``
         the reduced network, its misfit, and what the fit warns of
-    ``contact_points``
-        contact points at full resolution
+    ``contact_points``, ``levels``
+        contact points at full resolution; levels in which the fibrils of the centre warp yarn lie at its centre
+        crossing
     ``netlist``
         path of the detailed netlist, relative to the folder of the file
     ``verification``
@@ -143,6 +144,7 @@ def _state(record: Record) -> dict[str, Any]:
         "fit_residual": record.fit.residual,
         "fit_warnings": record.fit.warnings,
         "contact_points": record.contacts.n_contacts,
+        "levels": record.levels,
         "netlist": record.netlist,
         "verification": {
             "routes": verification.routes,

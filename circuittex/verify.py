@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import combinations
 from typing import ParamSpec, TypeVar
 
@@ -16,6 +17,7 @@ from circuittex.errors import NgspiceError
 from circuittex.fields import Fields, solve_probes
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import Floats
+from circuittex.geometry.refine import refined
 from circuittex.netlist import deck, pin_names
 from circuittex.ngspice import run_decks
 from circuittex.nodal import solve_nodal
@@ -113,6 +115,26 @@ def verify(
         ngspice_checked="ngspice" in routes,
         note=note,
     )
+
+
+def field_convergence(
+    contacts: ContactState, terminals: Sequence[Terminal], probes: Sequence[Probe], fields: Sequence[Fields]
+) -> Floats:
+    """How the potential on the mechanical mesh converges to the circuit: (3, 2) node distance mm, current error.
+
+    The nodes of the mechanical mesh, then two and four times as many; the error is the largest relative
+    difference of a probe current from `fields`, the solutions on the mesh "feet", which equal the circuit.
+    """
+    exact = [f.currents[0] for f in fields]
+    mesh, rows = contacts.mesh, []
+    distance = float((mesh.length / (np.diff(mesh.first_node) - 1)).max())
+    for pieces in (1, 2, 4):
+        finer = replace(
+            contacts, mesh=refined(mesh, pieces), axial_factor=np.repeat(contacts.axial_factor, mesh.order * pieces)
+        )
+        currents = [f.currents[0] for f in solve_probes(finer, terminals, probes, mesh="mechanical")]
+        rows.append((distance / pieces, _relative(currents, exact)))
+    return np.array(rows)
 
 
 class _Clock:

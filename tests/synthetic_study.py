@@ -90,6 +90,8 @@ def _record(
             currents=np.array([0.884, 0.0066, 0.0078]),
         ),
         reduced_difference=3e-12,
+        field_convergence=np.empty((0, 2)) if path else np.array([[0.2, 4e-6], [0.1, 1e-6], [0.05, 2.5e-7]]),
+        levels=2,
         verification=Verification(
             routes=("fields", "nodal", "ngspice"),
             max_voltage_difference=4e-13,

@@ -42,7 +42,7 @@ ALLOWED: dict[str, set[str]] = {
     "netlist": {"circuit", "spice_names", "netlist_reader", "pyspice_export"},
     "ngspice": {"netlist", "geometry.mesh"},
     "fit": {"circuit", "nodal", "design", "geometry.mesh"},
-    "verify": {*ROUTES, *STATE, "design", "spice_names"},
+    "verify": {*ROUTES, *STATE, "geometry.refine", "design", "spice_names"},
     "verify_reduced": {"circuit", "design", "fit", "netlist", "ngspice"},
     "export": {*STATE, "circuit", "contact.merge", "design", "fit", "netlist"},
     "results": RESULT_TYPES,

@@ -162,7 +162,7 @@ def state_names(loading: str, strains: tuple[float, ...]) -> tuple[str, ...]:
 
 
 def centre_crossing(design: Design) -> tuple[int, float]:
-    """The warp yarn nearest the centre, from below, and where along it (mm) it crosses the weft yarn nearest the centre."""
+    """The warp yarn nearest the centre, and where along it (mm) it crosses the weft yarn nearest the centre."""
     weave = design.weave
     weft = (len(weave.weft) - 1) // 2
     return (len(weave.warp) - 1) // 2, (weft - (len(weave.weft) - 1) / 2) * weave.pitch

@@ -13,20 +13,35 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from circuittex.errors import ConvergenceError
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import Floats, Ints
 from circuittex.mech.linear import LinearSolver, Solve
-from circuittex.mech.pattern import Pattern, build_pattern, diagonal
+from circuittex.mech.pattern import Pattern, build_pattern, diagonal, multiply
 from circuittex.mech.terms import ForceTerm
 
 FIRST_SHIFT, LEAST_SHIFT, LARGEST_SHIFT = 1e-2, 1e-5, 1e6
-"""Shifts in N/mm per g. The least keeps the fibrils' free spin about their axes, a true zero mode, solvable;
-it is a thousand times softer than the softest bending mode of the paper's fibrils."""
+"""Shifts, N/mm per g times `_System.scale`. The least keeps the fibrils' free spin about their axes, a true zero
+mode, solvable; it is a thousand times softer than the softest bending mode of the paper's fibrils."""
 SOFTENING = (1.0, 0.7, 0.3)
-"""Parts of the softening tangent that are tried: all of it gives Newton's quadratic convergence; with less, a
-descent through sliding contacts takes fewer iterations than with a larger shift alone."""
+"""Parts of the softening tangent that are tried far from equilibrium, where a descent through sliding contacts
+takes fewer iterations with less of it than with a larger shift alone. The search begins one place before the part
+that served last, since a factorisation that fails costs nearly as much as one that succeeds."""
+SADDLE = 2e-3
+"""A largest free force below this part of the largest force of all, with a tangent that needs a shift, is a saddle:
+the symmetry of a weave leads there, and Newton's method leaves it slowly."""
+ROUGH = 0.02
+"""Far from equilibrium the largest free force exceeds this part of the largest force of all. Nearer, only the whole
+tangent will do: with less of it the convergence is linear, and may end at a saddle."""
+STIFF = 2000.0
+"""Largest stiffness over mass of an unknown, N/mm per g, up to which the shifts hold as they are (the paper's cell has
+about that); they grow in proportion beyond, since what is small beside the tangent is lost in round-off."""
+INVERSE_ITERATIONS = 12
+"""Enough for the lowest mode to lead: its curvature and the shift nearly cancel."""
+FIRST_ESCAPE = 1e-3
+"""First step away from a saddle: largest change of an unknown, mm or one."""
 ROUND_OFF = 1e-13
 """Relative change of the potential that is round-off of its sum rather than an increase."""
 ARMIJO = 1e-4
@@ -35,7 +50,8 @@ ARMIJO = 1e-4
 
 @frozen
 class Minimum:
-    """A point where the potential's gradient vanishes on the free unknowns."""
+    """A minimum: the gradient vanishes on the free unknowns, and the tangent with the shift FIRST_SHIFT is positive
+    definite."""
 
     q: Floats
     """(n_dofs,) unknowns."""
@@ -63,6 +79,7 @@ class _System:
     mass: Floats = field(default_factory=lambda: np.empty(0))
     data: Floats = field(default_factory=lambda: np.empty(0))
     softening: Floats = field(default_factory=lambda: np.empty(0))
+    scale: float = 1.0
     held: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     def assemble(self, q: Floats) -> tuple[Pattern, float, Floats]:
@@ -83,7 +100,7 @@ class _System:
 
     def factor(self, solver: LinearSolver, shift: float, softening: float) -> Solve | None:
         assert self.pattern is not None
-        values = self.data + softening * self.softening + shift * self.mass
+        values = self.data + softening * self.softening + shift * self.scale * self.mass
         values[self.held] = 0.0
         values[diagonal(self.pattern)[self.fixed]] = 1.0
         return solver.factor(self.pattern, values)
@@ -116,18 +133,26 @@ def minimise(
     free = np.ones(len(q), dtype=bool)
     free[fixed] = False
     for iteration in range(max_iterations + 1):
-        _, energy, gradient = system.assemble(q)
+        pattern, energy, gradient = system.assemble(q)
+        if iteration == 0:
+            stiffness, inertia = (values[diagonal(pattern)][free] for values in (system.data, system.mass))
+            system.scale = max(1.0, float((stiffness / inertia).max()) / STIFF)
         residual = float(np.abs(gradient[free]).max())
         history.append((residual, energy, shift, step))
         if report is not None:
             report(iteration, residual)
         if not np.isfinite(energy):
             raise ConvergenceError("the potential is infinite: a fibril's section is inside out", np.array(history))
-        if residual <= tolerance:
+        if residual <= tolerance and system.factor(solver, FIRST_SHIFT, 1.0) is not None:
             return Minimum(q, gradient, energy, residual, iteration, np.array(history))
         if iteration == max_iterations:
             break
-        shift, part, solve = _positive(system, solver, shift, part, history)
+        parts = SOFTENING if residual > ROUGH * np.abs(gradient).max() else SOFTENING[:1]
+        shift, part, solve = _positive(system, solver, shift, parts[max(0, part - 1) :], history)
+        if shift > FIRST_SHIFT and residual < SADDLE * np.abs(gradient).max():
+            q = _escape(system, pattern, solve, q, energy, free)
+            step, shift = 1.0, FIRST_SHIFT
+            continue
         force = np.where(free, gradient, 0.0)
         direction = solve(-force)
         step = _search(system, q, direction, energy, float(force @ direction))
@@ -143,21 +168,44 @@ def minimise(
 
 
 def _positive(
-    system: _System, solver: LinearSolver, shift: float, part: int, history: list[tuple[float, float, float, float]]
+    system: _System,
+    solver: LinearSolver,
+    shift: float,
+    parts: Sequence[float],
+    history: list[tuple[float, float, float, float]],
 ) -> tuple[float, int, Solve]:
-    """The tangent made positive definite with less of its softening or else a larger shift: shift, part, factor.
+    """The tangent made positive definite with less of its softening or else a larger shift.
 
-    `part` is the place in `SOFTENING` that served last; the search starts one place before it, since a
-    factorisation that fails costs nearly as much as one that succeeds.
+    Returns the shift, the place in `SOFTENING` of the part that served, and the factor. Of `parts`, the first
+    that serves is taken.
     """
-    first = max(0, part - 1)
     while shift <= LARGEST_SHIFT:
-        for trial in range(first, len(SOFTENING)):
-            solve = system.factor(solver, shift, SOFTENING[trial])
+        for part in parts:
+            solve = system.factor(solver, shift, part)
             if solve is not None:
-                return shift, trial, solve
+                return shift, SOFTENING.index(part), solve
         shift = max(4 * shift, FIRST_SHIFT)
     raise ConvergenceError("the tangent stays indefinite under any shift", np.array(history))
+
+
+def _escape(
+    system: _System, pattern: Pattern, solve: Solve, q: Floats, energy: float, free: NDArray[np.bool_]
+) -> Floats:
+    """A lower point along the mode of the lowest curvature, found by inverse iteration with the shifted factor.
+
+    Of the two senses the one that leads lower is taken; the step doubles for as long as that pays.
+    """
+    mode = np.where(free, np.random.default_rng(0).standard_normal(len(q)), 0.0)
+    for _ in range(INVERSE_ITERATIONS):
+        mode = np.where(free, solve(np.where(free, multiply(pattern, system.mass, mode), 0.0)), 0.0)
+        mode /= np.abs(mode).max()
+    best, lowest = q, energy
+    for sense in (-1.0, 1.0):
+        step = FIRST_ESCAPE
+        while (trial := system.energy(q + sense * step * mode)) < lowest:
+            best, lowest = q + sense * step * mode, trial
+            step *= 2
+    return best
 
 
 def _search(system: _System, q: Floats, direction: Floats, energy: float, slope: float) -> float:

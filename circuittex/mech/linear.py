@@ -145,13 +145,13 @@ class PardisoSolver:
     _NOT_POSITIVE = -4
 
     def __init__(self) -> None:
+        self._pattern: Pattern | None = None
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # pypardiso warns about its own optional dependencies
             import pypardiso
 
         self._error = pypardiso.pardiso_wrapper.PyPardisoError
         self._pardiso = pypardiso.PyPardisoSolver(mtype=self._CHOLESKY)
-        self._pattern: Pattern | None = None
         self._matrix: Any = None
 
     def _call(self, phase: int, b: Floats) -> Floats:

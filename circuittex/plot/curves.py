@@ -91,6 +91,23 @@ def verification_figure(study: Study) -> Figure:
     return figure
 
 
+def convergence_figure(study: Study) -> Figure:
+    """Current error of the field on the mechanical mesh against its node distance, beside the slope of second order."""
+    with style():
+        figure = new_figure(4.6, 3.2)
+        axes = figure.add_subplot()
+        for number, record in enumerate(r for r in study.records if len(r.field_convergence)):
+            distance, error = record.field_convergence.T
+            error = np.maximum(error, np.finfo(float).eps)  # a logarithm has no zero
+            axes.loglog(distance, error, MARKERS[number], color=COLOURS[number], label=record.name, markersize=5)
+            axes.loglog(distance, error[0] * (distance / distance[0]) ** 2, color=GREY, linestyle="--", linewidth=1.0)
+        axes.set_xlabel("node distance (mm)")
+        axes.set_ylabel("largest relative current error")
+        axes.set_title("dashed: second order")
+        figure.legend(loc="outside lower center")
+    return figure
+
+
 def _clamp_force(side: int, component: int) -> Callable[[Record], float]:
     return lambda record: float(record.clamp_force[side, component])
 

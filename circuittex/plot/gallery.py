@@ -7,7 +7,13 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from circuittex.plot.curves import conductance_figure, force_figure, network_figure, verification_figure
+from circuittex.plot.curves import (
+    conductance_figure,
+    convergence_figure,
+    force_figure,
+    network_figure,
+    verification_figure,
+)
 from circuittex.plot.section import section_figure
 from circuittex.plot.style import save
 from circuittex.plot.weave import cell_figure, probe_figure
@@ -22,9 +28,10 @@ FIGURES: dict[str, Callable[[Study], Figure]] = {
     "probes": conductance_figure,
     "network": network_figure,
     "verification": verification_figure,
+    "convergence": convergence_figure,
 }
 """Name -> what draws it; all of them need at least one record."""
-NEED_PROBES = {"currents", "temperatures", "probes", "network"}
+NEED_PROBES = {"currents", "temperatures", "probes", "network", "convergence"}
 
 
 def save_figures(study: Study, folder: str | Path) -> dict[str, Path]:

@@ -61,6 +61,7 @@ another. Merging is the relative change of a probe current by merging neighbouri
 mechanical mesh is the relative difference when voltages are solved on the mesh of the mechanics. The time is that of
 all routes.</p>
 $figure_verification
+$figure_convergence
 $verification
 <h2>Parameters</h2>
 <p>Base units: mm, N, MPa, g, S, W, K, V.</p>

@@ -17,7 +17,7 @@ class Record:
     """Everything that is kept of one recorded equilibrium."""
 
     name: str
-    """For example 'relaxed' or 'stretch-0.0500'."""
+    """For example 'relaxed' or 'stretch-0.05'."""
     path: str
     """Name of the loading path; empty for the relaxed state."""
     strain: float

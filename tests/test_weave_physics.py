@@ -80,7 +80,7 @@ def test_without_contact_conduction_the_currents_know_nothing_of_the_deformation
     ]
     found = [currents(solve_probes(s, cell.design.terminals, cell.design.probes)) for s in states]
     assert states[1].n_contacts > 0
-    assert not np.array_equal(states[1].line_load.sum(), states[2].line_load.sum())  # the states do differ
+    assert states[1].line_load.sum() != states[2].line_load.sum()  # the states do differ
     yarn = 3 * np.pi * 0.15**2 * 10.0 / 4.0
     for straight_, *across in found:
         assert straight_ == pytest.approx(found[0][0], rel=1e-12)
@@ -100,7 +100,7 @@ def test_the_circuit_without_contact_conduction_is_cut_between_the_yarns(cell: C
 
 
 def test_contacts_that_conduct_carry_current_and_feel_the_deformation(cell: Cell) -> None:
-    """The counterpart: the three tests above must be able to fail."""
+    """The counterpart: the two tests above can fail."""
     relaxed, stretched = (
         currents(
             solve_probes(
@@ -117,23 +117,12 @@ def test_contacts_that_conduct_carry_current_and_feel_the_deformation(cell: Cell
 # ---- Symmetry ---------------------------------------------------------------------------------------------
 
 
-def test_a_quarter_turn_takes_the_clamp_force_of_the_warp_into_that_of_the_weft(cell: Cell) -> None:
-    """The 1/1 cell is its own image under a turn by 90 degrees about z, which takes +x ends to +y ends."""
-    warp, weft = clamp_force(cell.mesh, cell.relaxed.reaction)
-    assert warp[0] > 0.01
-    assert weft[1] == pytest.approx(warp[0], rel=1e-5)
-    np.testing.assert_allclose(weft, [-warp[1], warp[0], warp[2]], atol=1e-5 * warp[0])
-
-
-def test_stretching_the_warp_breaks_that_symmetry(cell: Cell) -> None:
-    warp, weft = clamp_force(cell.mesh, cell.stretched.reaction)
-    assert warp[0] > 1.1 * weft[1]
-
-
 def test_stretching_the_weft_instead_is_the_turned_experiment(cell: Cell) -> None:
+    """A quarter turn about z takes the 1/1 cell into itself; at rest `test_relaxation` checks it."""
     start = move(cell.relaxed.configuration, np.eye(2), np.diag([1.0, 1.05]))
     turned = relax(cell.mesh, cell.design, start)
     along_x, along_y = (clamp_force(cell.mesh, s.reaction) for s in (cell.stretched, turned))
+    assert along_x[0, 0] > 1.1 * along_x[1, 1]  # warp and weft do differ
     assert along_y[1, 1] == pytest.approx(along_x[0, 0], rel=1e-5)
     assert along_y[0, 0] == pytest.approx(along_x[1, 1], rel=1e-5)
 

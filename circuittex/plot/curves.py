@@ -57,6 +57,8 @@ def network_figure(study: Study) -> Figure:
         insulated = insulated_resistance(study.mesh)
         if np.isfinite(insulated):
             left.axhline(insulated, color=GREY, linestyle="--", linewidth=1.0, label=f"insulated, {insulated:.4g} Ω")
+            low, high = left.get_ylim()  # at least 1 % either side, lest differences in the fifth digit fill the axis
+            left.set_ylim(min(low, 0.99 * insulated), max(high, 1.01 * insulated))
         left.set_title("yarn segment")
         left.set_ylabel("Ry (Ω)")
         _plot_paths(right, study, lambda r: r.fit.Rc, 1, "")

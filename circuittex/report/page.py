@@ -32,8 +32,8 @@ _CAPTIONS = {
     "without any contacts) and Rc of a crossing.",
     "verification": "Largest differences between the independent routes to the same voltages and currents, and what "
     "merging contacts and the finite-element mesh change.",
-    "convergence": "The potential on the mesh of the mechanics, and on two refinements of it, converges to the circuit: "
-    "largest relative error of a probe current in the relaxed state.",
+    "convergence": "The potential on the mesh of the mechanics, and on two refinements of it, converges to the "
+    "circuit: largest relative error of a probe current in the relaxed state.",
 }
 
 

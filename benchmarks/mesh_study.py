@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from circuittex.contact.extract import contact_state
+from circuittex.contact.extract import contacts_of
 from circuittex.design import Design, plain_weave
 from circuittex.fields import solve_probes
 from circuittex.fit import fit_network
@@ -31,7 +31,7 @@ def rows(design: Design) -> list[str]:
         clock = time.perf_counter()
         state: Equilibrium = relax(mesh, design, start)
         seconds = time.perf_counter() - clock
-        contacts = contact_state(mesh, state.configuration, design.contact, per_element=design.numerics.contact_points)
+        contacts = contacts_of(design, mesh, state.configuration)
         currents = [f.currents[0] for f in solve_probes(contacts, design.terminals, design.probes)]
         fit = fit_network(currents, design)
         force = clamp_force(mesh, state.reaction)

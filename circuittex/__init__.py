@@ -13,7 +13,7 @@ _HOMES = {
     "geometry.weave": ("build_mesh",),
     "mech.configuration": ("initial_configuration",),
     "contact.state": ("ContactState",),
-    "contact.extract": ("contact_state",),
+    "contact.extract": ("contact_state", "contacts_of"),
     "contact.merge": ("simplify",),
     "fields": ("solve_fields",),
     "circuit": ("Circuit", "build_circuit", "reduced_circuit", "yarn_end_terminals"),
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from circuittex.circuit import reduced_circuit as reduced_circuit
     from circuittex.circuit import yarn_end_terminals as yarn_end_terminals
     from circuittex.contact.extract import contact_state as contact_state
+    from circuittex.contact.extract import contacts_of as contacts_of
     from circuittex.contact.merge import simplify as simplify
     from circuittex.contact.state import ContactState as ContactState
     from circuittex.design import Design as Design

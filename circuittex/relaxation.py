@@ -33,7 +33,7 @@ class Equilibrium:
     iterations: int
     """Newton iterations."""
     history: Floats
-    """(iterations + 1, 4) residual N, potential N mm, shift, step length."""
+    """(iterations + 1, 4) residual N, potential N mm, shift N/(mm g), step length."""
 
 
 def force_terms(mesh: FibrilMesh, design: Design) -> tuple[BeamSpace, Beam, PenaltyContact]:

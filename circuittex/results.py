@@ -31,7 +31,7 @@ class Record:
     iterations: int
     """Newton iterations spent on this state."""
     history: Floats
-    """(n, 4) per iteration: residual N, energy N mm, shift 1/s2, step length."""
+    """(n, 4) per iteration: residual N, energy N mm, shift N/(mm g), step length."""
     clamp_force: Floats
     """(2, 3) total force of the clamps on the +x ends of the warp and the +y ends of the weft, N [40, 41]."""
     section_force: Floats

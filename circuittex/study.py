@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from circuittex import __version__
-from circuittex.contact.extract import contact_state
+from circuittex.contact.extract import contacts_of
 from circuittex.design import Design, design_hash
 from circuittex.export import simplified, write_netlists
 from circuittex.fields import solve_probes
@@ -88,13 +88,7 @@ def record_state(
 ) -> Record:
     """Contacts, fields, circuit, netlists (with a `folder`), verification and fit of one equilibrium."""
     design, mesh = study.design, study.mesh
-    contacts = contact_state(
-        mesh,
-        equilibrium.configuration,
-        design.contact,
-        per_element=design.numerics.contact_points,
-        conduction=design.electrical.conduction,
-    )
+    contacts = contacts_of(design, mesh, equilibrium.configuration)
     fields = solve_probes(contacts, design.terminals, design.probes, contact_heat=design.electrical.contact_heat)
     simple = simplified(design, contacts)
     fit = fit_network([f.currents[0] for f in fields], design)

@@ -142,5 +142,5 @@ def test_current_law_puts_the_parts_of_an_element_in_series() -> None:
 
 def test_conduction_law_is_chosen_by_name() -> None:
     mesh = rails(length=1.0)
-    state = contact_state(mesh, initial_configuration(mesh), LAW, conduction="current")
+    state = contact_state(mesh, initial_configuration(mesh), LAW, per_element=4, conduction="current")
     assert state.axial_factor == pytest.approx(np.full(12, 0.5), rel=1e-13)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from circuittex.contact.extract import contact_state
+from circuittex.contact.extract import contacts_of
 from circuittex.design import Design, plain_weave
 from circuittex.fields import solve_probes
 from circuittex.geometry.levels import levels
@@ -101,7 +101,7 @@ def test_warp_stretch_raises_its_tension_and_changes_the_weft_s(cell: Cell) -> N
 
 def test_probe_currents_are_ordered_as_the_paper_says(cell: Cell) -> None:
     """Probe 1 carries most; a yarn without contacts carries 0.8836 A, and contacts can only add (Rayleigh)."""
-    contacts = contact_state(cell.mesh, cell.relaxed.configuration, cell.design.contact)
+    contacts = contacts_of(cell.design, cell.mesh, cell.relaxed.configuration)
     straight, parallel, perpendicular = (
         f.currents[0] for f in solve_probes(contacts, cell.design.terminals, cell.design.probes)
     )

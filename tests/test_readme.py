@@ -14,7 +14,7 @@ def test_the_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
     (example,) = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.S)
     exec(compile(example, str(README), "exec"), {})
     lines = capsys.readouterr().out.splitlines()
-    by_fields, by_circuit, heat = map(float, re.findall(r"\d+\.\d+", lines[0]))
+    by_fields, by_circuit, heat = map(float, re.findall(r"-?\d+\.\d+", lines[0]))
     assert by_fields == by_circuit
     assert heat == pytest.approx(by_fields, abs=2e-6)  # V I at 1 V, both printed to six digits
     assert lines[1].startswith("*")

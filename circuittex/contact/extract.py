@@ -7,7 +7,7 @@ import numpy as np
 from circuittex.contact.law import effective_modulus, effective_radius, hertz_width
 from circuittex.contact.penalty import PenaltyContact
 from circuittex.contact.state import ContactState
-from circuittex.design import ContactLaw
+from circuittex.design import ContactLaw, Design
 from circuittex.geometry.mesh import FibrilMesh, Floats
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.space import BeamSpace, beam_space
@@ -18,7 +18,7 @@ def contact_state(
     configuration: Configuration,
     law: ContactLaw,
     *,
-    per_element: int = 4,
+    per_element: int,
     conduction: str = "reference",
 ) -> ContactState:
     """The contact points of a configuration with their loads, Hertz widths and conductances.
@@ -52,6 +52,17 @@ def contact_state(
         conductance=np.where(conducts, law.conductivity * width * weight, 0.0),
         heat_conductance=law.heat_transfer * width * weight,
         axial_factor=axial_factor(space, configuration) if conduction == "current" else np.ones(len(mesh.elements)),
+    )
+
+
+def contacts_of(design: Design, mesh: FibrilMesh, configuration: Configuration) -> ContactState:
+    """The contact state of a configuration of a design's fibrils, by the design's own laws and numerics."""
+    return contact_state(
+        mesh,
+        configuration,
+        design.contact,
+        per_element=design.numerics.contact_points,
+        conduction=design.electrical.conduction,
     )
 
 

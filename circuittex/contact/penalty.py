@@ -96,10 +96,7 @@ class PenaltyContact:
             return self._last[1]
         r = self.positions(q)
         candidates = self._candidates
-        if (
-            candidates is None
-            or CONTROL_MOTION * np.sqrt(((r - self._built_at) ** 2).sum(axis=1).max()) > self.skin / 2
-        ):
+        if candidates is None or not self._valid(r):
             candidates = find_candidates(self.table, r, self.mesh.radius, 0.0)
         found = _search(self.mesh, self.table, self.points, candidates, r)
         self._last = q.copy(), found

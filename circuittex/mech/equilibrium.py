@@ -163,7 +163,7 @@ def minimise(
             continue
         q = q + step * direction
         shift = max(LEAST_SHIFT, shift / 4) if step == 1.0 else (shift if step >= 0.25 else 4 * shift)
-    message = f"no equilibrium in {max_iterations} iterations: the largest free force is {residual:.3g} N"
+    message = f"no equilibrium after {len(history) - 1} iterations: the largest free force is {residual:.3g} N"
     raise ConvergenceError(f"{message}, {tolerance:.3g} N was asked for", np.array(history))
 
 

@@ -77,7 +77,7 @@ class BeamForm:
     With a `natural` configuration X0, F = (dx/dxi) (dX0/dxi)^-1 and volumes are those of X0.
     """
 
-    def __init__(self, mesh: FibrilMesh, *, degree: int = 3, natural: Configuration | None = None) -> None:
+    def __init__(self, mesh: FibrilMesh, *, degree: int = 7, natural: Configuration | None = None) -> None:
         self._basis = vector_basis(mesh)
         self._natural = None if natural is None else self._basis.interpolate(beam_space(mesh).vector(natural))
         self._points = [(p, *self._reference(p)) for p in section_points(mesh, degree)]

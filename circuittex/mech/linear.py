@@ -7,7 +7,6 @@ the same `Pattern` object comes back.
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 import warnings
 from collections.abc import Callable
@@ -34,9 +33,11 @@ class LinearSolver(Protocol):
 
 def best_solver() -> LinearSolver:
     """The fastest installed: PARDISO, then CHOLMOD (both of the `fast` extra), then SciPy's SuperLU."""
-    for solver, package in ((PardisoSolver, "pypardiso"), (CholmodSolver, "cvxopt")):
-        if importlib.util.find_spec(package):
+    for solver in (PardisoSolver, CholmodSolver):
+        try:
             return solver()
+        except (ImportError, OSError):  # not installed, or a library of its own is missing
+            continue
     return SuperLUSolver()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -12,11 +13,20 @@ from beams import dense
 
 import circuittex.mech.linear as linear
 from circuittex.geometry.mesh import Floats
-from circuittex.mech.linear import LinearSolver, PardisoSolver, SuperLUSolver, best_solver
+from circuittex.mech.linear import CholmodSolver, LinearSolver, PardisoSolver, SuperLUSolver, best_solver
 from circuittex.mech.pattern import Pattern, build_pattern, diagonal
 
-HAS_PARDISO = importlib.util.find_spec("pypardiso") is not None
-SOLVERS: list[Callable[[], LinearSolver]] = [SuperLUSolver, *([PardisoSolver] if HAS_PARDISO else [])]
+
+def has(module: str) -> bool:
+    """Whether an optional package is installed."""
+    return importlib.util.find_spec(module) is not None
+
+
+SOLVERS: list[Callable[[], LinearSolver]] = [
+    SuperLUSolver,
+    *([PardisoSolver] if has("pypardiso") else []),
+    *([CholmodSolver] if has("cvxopt") else []),
+]
 NODES = 12
 
 every_solver = pytest.mark.parametrize("make", SOLVERS)
@@ -145,7 +155,11 @@ def test_superlu_orders_a_pattern_once_and_never_works_without_an_order(monkeypa
     assert orderings == ["MMD_AT_PLUS_A", "MMD_AT_PLUS_A", "NATURAL", "NATURAL"]
 
 
-@pytest.mark.parametrize(("installed", "name"), [(False, "superlu"), *([(True, "pardiso")] if HAS_PARDISO else [])])
-def test_best_solver_is_pardiso_where_installed(monkeypatch: pytest.MonkeyPatch, installed: bool, name: str) -> None:
-    monkeypatch.setattr(importlib.util, "find_spec", lambda _: object() if installed else None)
-    assert best_solver().name == name
+def test_best_solver_is_the_first_that_can_be_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wheel that is missing, or whose own libraries are, is passed over; SciPy is always there."""
+    installed = [name for name, module in (("pardiso", "pypardiso"), ("cholmod", "cvxopt")) if has(module)]
+    expected = [*installed, "superlu"]
+    assert best_solver().name == expected[0]
+    for module in ("pypardiso", "cvxopt"):
+        monkeypatch.setitem(sys.modules, module, None)  # makes its import raise ImportError
+    assert best_solver().name == "superlu"

@@ -40,7 +40,7 @@ STIFF = 2000.0
 about that); they grow in proportion beyond, since what is small beside the tangent is lost in round-off."""
 INVERSE_ITERATIONS = 12
 """Enough for the lowest mode to lead: its curvature and the shift nearly cancel."""
-FIRST_ESCAPE = 1e-3
+FIRST_ESCAPE = 1e-4
 """First step away from a saddle: largest change of an unknown, mm or one."""
 ROUND_OFF = 1e-13
 """Relative change of the potential that is round-off of its sum rather than an increase."""
@@ -150,9 +150,10 @@ def minimise(
         parts = SOFTENING if residual > ROUGH * np.abs(gradient).max() else SOFTENING[:1]
         shift, part, solve = _positive(system, solver, shift, parts[max(0, part - 1) :], history)
         if shift > FIRST_SHIFT and residual < SADDLE * np.abs(gradient).max():
-            q = _escape(system, pattern, solve, q, energy, free)
-            step, shift = 1.0, FIRST_SHIFT
-            continue
+            lower = _escape(system, pattern, solve, q, energy, free)
+            if lower is not None:
+                q, step, shift = lower, 1.0, FIRST_SHIFT
+                continue
         force = np.where(free, gradient, 0.0)
         direction = solve(-force)
         step = _search(system, q, direction, energy, float(force @ direction))
@@ -190,8 +191,9 @@ def _positive(
 
 def _escape(
     system: _System, pattern: Pattern, solve: Solve, q: Floats, energy: float, free: NDArray[np.bool_]
-) -> Floats:
-    """A lower point along the mode of the lowest curvature, found by inverse iteration with the shifted factor.
+) -> Floats | None:
+    """A lower point along the mode of the lowest curvature, found by inverse iteration with the shifted factor; None
+    where there is none within sight.
 
     Of the two senses the one that leads lower is taken; the step doubles for as long as that pays.
     """
@@ -199,7 +201,7 @@ def _escape(
     for _ in range(INVERSE_ITERATIONS):
         mode = np.where(free, solve(np.where(free, multiply(pattern, system.mass, mode), 0.0)), 0.0)
         mode /= np.abs(mode).max()
-    best, lowest = q, energy
+    best, lowest = None, energy
     for sense in (-1.0, 1.0):
         step = FIRST_ESCAPE
         while (trial := system.energy(q + sense * step * mode)) < lowest:

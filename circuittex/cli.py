@@ -69,10 +69,22 @@ def _run(options: argparse.Namespace) -> int:
     if not options.quiet:
         print(table(study))
         print(f"\nreport: {options.out / 'report.html'}")
+    if names := _disagreeing(study):
+        print(f"circuittex: the routes DISAGREE in {', '.join(names)}: do not trust these results", file=sys.stderr)
+        return DISAGREE
     return 0
 
 
+def _disagreeing(study: Study) -> list[str]:
+    """Names of the states on which the routes that answered do not agree."""
+    from circuittex.summary import agrees
+
+    return [record.name for record in study.records if record.verification.routes and not agrees(record)]
+
+
 def _netlist(options: argparse.Namespace) -> int:
+    if options.probe is not None and options.kind != "deck":
+        raise DesignError("--probe", options.probe, f"only --kind deck is made for a probe, not {options.kind}")
     study = _load(options.results)
     (record,) = _select(study, options.state)
     text = _netlist_text(study, record, options)
@@ -96,10 +108,11 @@ def _netlist_text(study: Study, record: Record, options: argparse.Namespace) -> 
     design = study.design
     if options.kind == "reduced":
         return reduced_netlist(design, record.name, record.fit)
-    simple = simplified(design, record.contacts, merge_length=None if options.resolution == "merged" else 0.0)
+    length = None if options.resolution == "merged" else 0.0
+    simple = simplified(design, record.contacts, merge_length=length)
     if options.kind == "subckt":
-        return detailed_netlist(design, record.name, simple)
-    return probe_netlist(design, record.name, simple, _probe(design, options.probe))
+        return detailed_netlist(design, record.name, simple, merge_length=length)
+    return probe_netlist(design, record.name, simple, _probe(design, options.probe), merge_length=length)
 
 
 def _probe(design: Design, name: str | None) -> Probe:
@@ -123,7 +136,7 @@ def _verify(options: argparse.Namespace) -> int:
         simple = simplified(design, record.contacts)
         check = verify(record.contacts, simple.contacts, design.terminals, design.probes)
         differences = check.max_voltage_difference, check.max_current_difference
-        agree &= check.ngspice_checked and all(difference <= AGREEMENT for difference in differences)
+        agree &= check.ngspice_checked and check.agrees
         numbers = [*differences, check.merge_error, check.field_difference]
         shown = " ".join(f"{number:8.1e}" for number in numbers)
         print(f"{record.name:<20} {shown}  {', '.join(check.routes)} {check.note}".rstrip(), flush=True)

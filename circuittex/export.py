@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import partial
 from pathlib import Path
 
@@ -32,18 +33,24 @@ def detailed_circuit(simple: Simplified) -> Circuit:
     return build_circuit(simple.contacts, terminals, dropped_contacts=simple.dropped_contacts)
 
 
-def detailed_netlist(design: Design, state: str, simple: Simplified) -> str:
-    """The `.subckt` of `detailed_circuit`."""
-    notes = (JOINED, *_counts(simple))
+def detailed_netlist(design: Design, state: str, simple: Simplified, *, merge_length: float | None = None) -> str:
+    """The `.subckt` of `detailed_circuit`; `merge_length` as it was given to `simplified`, for the header."""
+    notes = (JOINED, *_simplification(design, simple, merge_length))
     header = _header(design, state)("detailed resistor network of fibril segments and contacts", notes=notes)
-    return subcircuit(detailed_circuit(simple), f"{design.name} {state}", header)
+    return subcircuit(detailed_circuit(simple), f"{state_word(state)} {design.name}", header)
 
 
-def probe_netlist(design: Design, state: str, simple: Simplified, probe: Probe) -> str:
-    """A runnable deck of the detailed network as one probe sees it: all other fibril ends insulated one by one."""
+def probe_netlist(
+    design: Design, state: str, simple: Simplified, probe: Probe, *, merge_length: float | None = None
+) -> str:
+    """A runnable deck of the detailed network as one probe sees it: all other fibril ends insulated one by one.
+
+    `merge_length` as it was given to `simplified`, for the header.
+    """
     terminals = [terminal for terminal in design.terminals if terminal.name in (probe.source, probe.sink)]
     circuit = build_circuit(simple.contacts, terminals, dropped_contacts=simple.dropped_contacts)
-    header = _header(design, state)(f"detailed resistor network, probe {probe.name}", notes=_counts(simple))
+    notes = _simplification(design, simple, merge_length)
+    header = _header(design, state)(f"detailed resistor network, probe {probe.name}", notes=notes)
     return deck(circuit, {probe.source: probe.voltage, probe.sink: 0.0}, header)
 
 
@@ -52,7 +59,18 @@ def reduced_netlist(design: Design, state: str, fit: Fit) -> str:
     circuit = reduced_circuit((len(design.weave.warp), len(design.weave.weft)), fit.Ry, fit.Rc)
     notes = (f"Ry = {fit.Ry!r} ohm a yarn segment, Rc = {fit.Rc!r} ohm a crossing", *fit.warnings)
     header = _header(design, state)("reduced network of yarn segments and crossings", notes=notes)
-    return subcircuit(circuit, f"{design.name} {state} reduced", header)
+    return subcircuit(circuit, f"{state_word(state)} reduced {design.name}", header)
+
+
+def state_word(state: str) -> str:
+    """The state as it begins the names of its sub-circuits, where a long title of the design cannot cut it off.
+
+    SPICE ignores case and signs are no letters, so that a minus before a number is spelt out.
+
+    >>> state_word("stretch-0.05"), state_word("stretch--0.05")
+    ('stretch_0_05', 'stretch_minus_0_05')
+    """
+    return re.sub("[^a-z0-9]+", "_", state.lower().replace("--", "-minus-"))
 
 
 def write_netlists(folder: Path, design: Design, state: str, simple: Simplified, fit: Fit | None) -> Path:
@@ -73,5 +91,24 @@ def _header(design: Design, state: str) -> partial[Header]:
     return partial(Header, design=design.name, design_hash=design_hash(design), state=state)
 
 
-def _counts(simple: Simplified) -> tuple[str, ...]:
-    return (f"contact points added to a neighbour of the same two fibrils: {simple.merged_contacts}",)
+def _simplification(design: Design, simple: Simplified, merge_length: float | None) -> tuple[str, ...]:
+    """What was done to the contacts, and how often."""
+    numerics = design.numerics
+    length = numerics.merge_length if merge_length is None else merge_length
+    merged = (
+        f"contact points of two fibrils in the same bin of {length!r} mm are one: {simple.merged_contacts} were added "
+        "to another"
+        if length
+        else "contact points are not merged"
+    )
+    snapped = (
+        f"feet on a fibril closer than {numerics.snap_length!r} mm share a node: {simple.merged_feet} were moved onto "
+        "another"
+        if numerics.snap_length
+        else "feet are not snapped"
+    )
+    dropped = (
+        f"contacts below {numerics.drop_fraction!r} of the largest conductance are left out: "
+        f"{simple.dropped_contacts} were"
+    )
+    return merged, snapped, dropped

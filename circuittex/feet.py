@@ -9,17 +9,27 @@ from circuittex.errors import CircuitError
 from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
 from circuittex.spice_names import unique_names
 
-# How far outside a fibril a closest point may lie by rounding, relative to the fibril's length.
 _OUTSIDE = 1e-12
+"""How far outside a fibril a closest point may lie by rounding, relative to the fibril's length."""
+
+_APART = 1e-9
+"""Feet closer than this fraction of the fibril's length share a node. Both sides of a contact find the same place up
+to rounding, and a segment of that length would have a resistance made of rounding errors, which drown the solution."""
 
 
 def live_contacts(contacts: ContactState) -> Ints:
     """Return the contacts that can carry current: conductance above zero, both fibrils conducting."""
     sigma = contacts.mesh.electrical_conductivity
-    values = {"conductance": contacts.conductance, "xi_a": contacts.xi_a, "xi_b": contacts.xi_b}
-    for name, array in values.items():
-        if not np.isfinite(array).all() or array.min(initial=0.0) < -_OUTSIDE * contacts.mesh.length.max():
-            bad = int(np.argmax(~(array >= 0.0) | ~np.isfinite(array)))
+    outside = _OUTSIDE * contacts.mesh.length  # a coordinate may miss the fibril's end by rounding, a conductance not
+    values = {
+        "conductance": (contacts.conductance, np.zeros(contacts.n_contacts)),
+        "xi_a": (contacts.xi_a, -outside[contacts.fibril_a]),
+        "xi_b": (contacts.xi_b, -outside[contacts.fibril_b]),
+    }
+    for name, (array, least) in values.items():
+        usable = np.isfinite(array) & (array >= least)
+        if not usable.all():
+            bad = int(np.argmin(usable))
             raise CircuitError(f"contact {bad}: {name} is {float(array[bad])!r}; it must be finite and not negative")
     conducting = (sigma[contacts.fibril_a] > 0) & (sigma[contacts.fibril_b] > 0)
     return np.flatnonzero(conducting & (contacts.conductance > np.finfo(float).tiny))  # 1 / G stays finite
@@ -28,6 +38,7 @@ def live_contacts(contacts: ContactState) -> Ints:
 def sites(contacts: ContactState, live: Ints) -> tuple[Ints, Floats, Ints, Ints]:
     """Return the distinct places where a node is needed, fibril after fibril, xi ascending.
 
+    Feet that only rounding keeps apart are one place, at the lowest of them or at the fibril end among them.
     Their fibrils (S,) and coordinates (S,), the sites of both feet of each live contact (L, 2), and those of the two
     ends of each fibril (F, 2), -1 for an insulating one, which has no sites.
     """
@@ -45,14 +56,16 @@ def sites(contacts: ContactState, live: Ints) -> tuple[Ints, Floats, Ints, Ints]
     xi = np.clip(xi, 0.0, limit)
     order = np.lexsort((xi, fibril))
     new = np.ones(len(order), dtype=bool)
-    new[1:] = (np.diff(fibril[order]) != 0) | (np.diff(xi[order]) != 0)
+    new[1:] = (np.diff(fibril[order]) != 0) | (np.diff(xi[order]) > _APART * limit[order[1:]])
     site = np.empty(len(order), dtype=np.int64)
     site[order] = np.cumsum(new) - 1
     first = order[new]
+    place = xi[first]
     n = len(live)
     end_site = np.full((mesh.n_fibrils, 2), -1, dtype=np.int64)
     end_site[conducting] = site[2 * n :].reshape(2, -1).T
-    return fibril[first].astype(np.int64), xi[first], site[: 2 * n].reshape(2, -1).T, end_site
+    place[end_site[conducting]] = ends.T
+    return fibril[first].astype(np.int64), place, site[: 2 * n].reshape(2, -1).T, end_site
 
 
 def axial_resistance(contacts: ContactState, fibril: Ints, xi: Floats) -> Floats:

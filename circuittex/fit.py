@@ -14,13 +14,15 @@ from circuittex.frozen import frozen
 from circuittex.geometry.mesh import Floats
 from circuittex.nodal import solve_nodal
 
-# A current below this fraction of the largest is none: it is rounding of the solution that it came from.
+# A conductance below this fraction of that of an insulated yarn is none: it is rounding of the solution.
 _NONE = 1e-12
 # Rc / Ry of the start values, one for each decade, and how far beyond them the search may go.
 _RATIOS = np.logspace(-8.0, 10.0, 19)
 _BEYOND = 10.0
 # A value is called undetermined where a relative error of the weighted currents comes back this many times larger.
 _AMPLIFIED = 100.0
+# A misfit below this fraction of the currents is rounding.
+_EXACT = 1e-15
 
 
 @frozen
@@ -28,11 +30,13 @@ class Fit:
     """The reduced network that comes closest to the currents of the probes."""
 
     Ry: float
-    """Resistance of a yarn segment from crossing to crossing, ohm."""
+    """Resistance of a yarn segment from crossing to crossing, ohm; inf where no yarn conducts along itself, nan where
+    the probes do not tell."""
     Rc: float
-    """Resistance of a crossing, ohm; inf where no probe that crosses between yarns carries current."""
+    """Resistance of a crossing, ohm; inf where no probe that crosses between yarns carries current, nan where the
+    probes do not tell."""
     residual: float
-    """Root of the sum of squared misfits: relative ('relative') or in A ('absolute')."""
+    """Root of the sum of squared misfits: relative ('relative') or in A ('absolute'); nan without probes."""
     covariance: Floats
     """(2, 2) of Ry and Rc, ohm2, from the misfit with two degrees of freedom spent; inf where nothing tells."""
     weighting: str
@@ -50,19 +54,42 @@ def fit_network(currents: Sequence[float] | Floats, design: Design, *, weighting
     carry about a hundredth of the current along one yarn, so in the absolute sum the little that the network cannot
     follow along the yarn outweighs all they say about Rc; relative misfits let every probe speak.
 
-    Raises `CircuitError` for currents that are not one finite number for each probe, flow backwards, or all vanish.
+    What does not conduct has the value inf, and what the probes do not tell is nan; `warnings` says so. A probe
+    carries nothing if its conductance is less than 1e-12 of that of an insulated yarn of the design.
+
+    Raises `CircuitError` for currents that are not one finite number for each probe, or that flow backwards.
     """
     if weighting not in ("relative", "absolute"):
         raise CircuitError(f"weighting: {weighting!r} is not usable; it must be 'relative' or 'absolute'")
     volts = np.array([probe.voltage for probe in design.probes])
-    wanted = _checked(currents, volts)
-    size = float(wanted.max())
-    carries = wanted > _NONE * size
-    scale: Floats = np.where(carries, wanted, size) if weighting == "relative" else 1.0 / np.abs(volts)
+    wanted = _checked(currents, design, volts)
+    carries = wanted > 0.0
     insulated = network_conductances(design, 1.0, np.inf).sum(axis=1)
+    if not carries.any():
+        return _without_current(insulated, yarn_conductance(design), weighting)
+    size = float(wanted.max())
+    scale: Floats = np.where(carries, wanted, size) if weighting == "relative" else 1.0 / np.abs(volts)
     if np.array_equal(carries, insulated > 0.0):
         return _without_contacts(insulated, wanted, scale, volts, weighting)
     return _with_contacts(design, wanted, scale, volts, weighting)
+
+
+def yarn_conductance(design: Design) -> float:
+    """Return the largest Σ sigma π R² / L of an insulated yarn, with L its straight length across the cell, S.
+
+    >>> from circuittex.design import plain_weave
+    >>> round(yarn_conductance(plain_weave()), 4)
+    0.8836
+    """
+    weave = design.weave
+    crossings = [len(weave.weft)] * len(weave.warp) + [len(weave.warp)] * len(weave.weft)
+    return max(
+        sum(material.electrical_conductivity for material in yarn.materials)
+        * np.pi
+        * yarn.radius**2
+        / (count * weave.pitch)
+        for yarn, count in zip(weave.warp + weave.weft, crossings, strict=True)
+    )
 
 
 def network_conductances(design: Design, Ry: float, Rc: float) -> Floats:
@@ -85,19 +112,40 @@ def network_conductances(design: Design, Ry: float, Rc: float) -> Floats:
     return np.array(shares, dtype=np.float64).reshape(-1, 2)
 
 
-def _checked(currents: Sequence[float] | Floats, volts: Floats) -> Floats:
-    """Return I / U of each probe after looking at it."""
+def _checked(currents: Sequence[float] | Floats, design: Design, volts: Floats) -> Floats:
+    """Return I / U of each probe after looking at it; 0 where it is nothing but rounding."""
     found = np.asarray(currents, dtype=np.float64)
-    if found.shape != volts.shape or not np.isfinite(found).all() or len(found) == 0:
+    if found.shape != volts.shape or not np.isfinite(found).all():
         raise CircuitError(
             f"currents: {found.tolist()} is not usable; it must be one finite number for each of {len(volts)} probes"
         )
     conductance: Floats = found / volts
-    if conductance.max() <= 0.0:
-        raise CircuitError(f"currents: {found.tolist()} is not usable; at least one probe must carry current")
-    if conductance.min() < -_NONE * conductance.max():
+    nothing = _NONE * yarn_conductance(design)
+    if conductance.min(initial=0.0) < -max(nothing, _NONE * conductance.max(initial=0.0)):
         raise CircuitError(f"currents: {found.tolist()} is not usable; no current may flow against its voltage")
-    return conductance
+    return np.where(conductance > nothing, conductance, 0.0)
+
+
+def _without_current(insulated: Floats, yarns: float, weighting: str) -> Fit:
+    """Say what follows from no current at all: something on the way of every probe does not conduct."""
+    Ry = Rc = float("nan")
+    if not len(insulated):
+        warnings: tuple[str, ...] = ("there are no probes: Ry and Rc are not determined",)
+    elif yarns == 0.0 or insulated.any():
+        Ry = float("inf")
+        warnings = ("no probe carries current: the yarns do not conduct, and Rc is not determined",)
+    else:
+        Rc = float("inf")
+        warnings = ("no probe carries current: the crossings do not conduct, and Ry is not determined",)
+    return Fit(
+        Ry=Ry,
+        Rc=Rc,
+        residual=0.0 if len(insulated) else float("nan"),
+        covariance=np.diag([np.inf, np.inf]),
+        weighting=weighting,
+        warnings=warnings,
+        currents=np.zeros(len(insulated)),
+    )
 
 
 def _without_contacts(insulated: Floats, wanted: Floats, scale: Floats, volts: Floats, weighting: str) -> Fit:
@@ -124,45 +172,53 @@ def _with_contacts(design: Design, wanted: Floats, scale: Floats, volts: Floats,
     for ratio in _RATIOS:
         model = network_conductances(design, 1.0, ratio).sum(axis=1) / scale
         siemens = float(model @ target / (model @ model))
-        misfit = float(np.linalg.norm(siemens * model - target))
-        if siemens > 0.0 and misfit < best:
-            start, best = np.log([1.0 / siemens, ratio / siemens]), misfit
+        size = float(np.linalg.norm(siemens * model - target))
+        if siemens > 0.0 and size < best:
+            start, best = np.log([1.0 / siemens, ratio]), size
+
+    # The search is in log Ry and log Rc / Ry: bounds of the ratio keep the network solvable.
+    def values(logs: Floats) -> tuple[float, float]:
+        return float(np.exp(logs[0])), float(np.exp(logs[0] + logs[1]))
 
     def misfits(logs: Floats) -> Floats:
-        difference: Floats = network_conductances(design, *np.exp(logs)).sum(axis=1) / scale - target
+        difference: Floats = network_conductances(design, *values(logs)).sum(axis=1) / scale - target
         return difference
 
     def jacobian(logs: Floats) -> Floats:
-        return -network_conductances(design, *np.exp(logs)) / scale[:, None]
+        return -network_conductances(design, *values(logs)) @ [[1.0, 0.0], [1.0, 1.0]] / scale[:, None]
 
-    reach = np.log(_BEYOND * np.array([1.0 / _RATIOS[0], _RATIOS[-1]]))
-    low, high = start[0] - reach[0], start[0] + reach[1]
-    found = least_squares(
-        misfits,
-        start,
-        jacobian,
-        bounds=([-np.inf, low], [np.inf, high]),
-        xtol=1e-15,
-        ftol=None,  # small misfits and slopes do not end the search: Rc may show in nothing but tiny currents
-        gtol=None,
-    )
-    Ry, Rc = (float(value) for value in np.exp(found.x))
-    spread, warnings = _spread(jacobian(found.x), float(np.abs(target).max()))
-    if not low + 1.0 < found.x[1] < high - 1.0:
+    low, high = np.log([_RATIOS[0] / _BEYOND, _RATIOS[-1] * _BEYOND])
+    logs = start
+    if best > _EXACT * float(np.linalg.norm(target)):  # as one probe alone always is; the search would divide by 0
+        logs = least_squares(
+            misfits,
+            start,
+            jacobian,
+            bounds=([-np.inf, low], [np.inf, high]),
+            xtol=1e-15,
+            ftol=None,  # small misfits and slopes do not end the search: Rc may show in nothing but tiny currents
+            gtol=None,
+        ).x
+    misfit = misfits(logs)
+    Ry, Rc = values(logs)
+    shares = network_conductances(design, Ry, Rc)
+    spread, warnings = _spread(-shares / scale[:, None], float(np.abs(target).max()))
+    if not low + 1.0 < logs[1] < high - 1.0:
         warnings += (f"Rc is at the edge of the search, {Rc:.3g} ohm: no crossing resistance explains the currents",)
     if len(wanted) < 3:
         warnings += (f"{len(wanted)} probes leave no misfit to judge the fit by: the covariance is unknown",)
-    values = np.array([Ry, Rc])
-    variance = _variance(found.fun)
-    covariance = variance * spread * np.outer(values, values) if np.isfinite(variance) else np.diag([np.inf, np.inf])
+    variance = _variance(misfit)
+    covariance = (
+        variance * spread * np.outer([Ry, Rc], [Ry, Rc]) if np.isfinite(variance) else np.diag([np.inf, np.inf])
+    )
     return Fit(
         Ry=Ry,
         Rc=Rc,
-        residual=float(np.linalg.norm(found.fun)),
+        residual=float(np.linalg.norm(misfit)),
         covariance=covariance,
         weighting=weighting,
         warnings=warnings,
-        currents=network_conductances(design, Ry, Rc).sum(axis=1) * volts,
+        currents=shares.sum(axis=1) * volts,
     )
 
 

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from circuittex import __version__
-from circuittex.circuit import KINDS, Circuit, islands, port_nodes, reached_part
+from circuittex.circuit import KINDS, Circuit, reached_part
 from circuittex.errors import CircuitError
 from circuittex.frozen import frozen
 from circuittex.netlist_reader import parse
@@ -22,19 +22,13 @@ from circuittex.pyspice_export import to_pyspice
 from circuittex.spice_names import safe_name, unique_names
 
 __all__ = [
-    "OPEN_OHM",
     "Header",
-    "circuits_deck",
     "deck",
-    "drives_deck",
     "parse",
     "pin_names",
     "subcircuit",
     "to_pyspice",
 ]
-
-OPEN_OHM = 1e15
-"""Series resistance that stands for an open port in `drives_deck`: what it lets pass is below rounding."""
 
 _LINE = 100
 
@@ -95,74 +89,6 @@ def deck(circuit: Circuit, drive: Mapping[str, float], header: Header | None = N
     lines = _head(part, words, header or Header()) + _cards(part, words) + ["* sources"]
     lines += [f"V{pins[port]} {pins[port]} 0 {_volts(port, volts)}" for port, volts in drive.items()]
     return "\n".join([*lines, ".op", ".end"]) + "\n"
-
-
-def drives_deck(circuit: Circuit, drives: Sequence[Mapping[str, float]], header: Header | None = None) -> str:
-    """Return an ngspice deck that solves several drives of one circuit in one sweep, point k for drive k.
-
-    The swept quantity is the number of the drive, from 1, and the sources are tables of it: unlike `alter` and `op`
-    in a control section, a sweep keeps the ordering of the matrix, which is what costs ngspice its time. A port that
-    some drives leave open has `OPEN_OHM` in series then; an island that a drive does not touch is held at 0 V, so that
-    it carries no current. As in `deck`, the current into the circuit is minus the current of V and the pin.
-
-    Raises `CircuitError` where there is no drive, or one that drives nothing.
-    """
-    if not drives or not all(drives):
-        raise CircuitError("drives: at least one drive is needed, and each must hold a port at a voltage")
-    part = reached_part(circuit, [port for drive in drives for port in drive])
-    words = unique_names(part.node_names)
-    pins = dict(zip(part.ports, _pins(part, words), strict=True))
-    settings = [_settings(part, drive) for drive in drives]
-    used = [port for port in part.ports if any(setting[port] is not None for setting in settings)]
-    number, *behind = unique_names([*words, "drive_number", *(f"{pins[port]}_source" for port in used)])[len(words) :]
-    lines = _head(part, words, header or Header()) + _cards(part, words)
-    lines += ["* sources", f"Vdrive_number {number} 0 1.0"]
-    for port, node in zip(used, behind, strict=True):
-        held = [setting[port] for setting in settings]
-        if len(set(held)) == 1:
-            lines.append(f"V{pins[port]} {pins[port]} 0 {_volts(port, held[0] or 0.0)}")
-            continue
-        volts = _table(number, [_volts(port, volt or 0.0) for volt in held])
-        if None in held:
-            ohm = _table(number, [repr(OPEN_OHM if volt is None else 0.0) for volt in held])
-            volts += f" + {ohm} * i(V{pins[port]})"
-        lines += [f"V{pins[port]} {pins[port]} {node} 0.0", f"B{pins[port]} {node} 0 V = {volts}"]
-    return "\n".join([*lines, f".dc Vdrive_number 1.0 {float(len(drives))!r} 1.0", ".end"]) + "\n"
-
-
-def _table(node: str, values: Sequence[str]) -> str:
-    """Return the function of the drive number with these values at 1, 2, ...; ngspice wants two knots or more."""
-    knots = ", ".join(f"{k}, {value}" for k, value in enumerate([*values, values[-1]], start=1))
-    return f"pwl(v({node}), {knots})"
-
-
-def circuits_deck(cases: Sequence[tuple[Circuit, Mapping[str, float]]], header: Header | None = None) -> str:
-    """Return a runnable deck of several driven circuits side by side: R, V, X and `.op` only, for any SPICE.
-
-    Case k, from 1, is the instance Xk; its pin p is the net 'case<k>_<p>', driven by the source 'Vcase<k>_<p>'.
-    """
-    parts = [reached_part(circuit, drive) for circuit, drive in cases]
-    head = header or Header()
-    lines = [_title(head), *_texts(head)]
-    for k, (part, (_, drive)) in enumerate(zip(parts, cases, strict=True), start=1):
-        words = unique_names(part.node_names)
-        pins = _pins(part, words)
-        nets = {port: f"case{k}_{pin}" for port, pin in zip(part.ports, pins, strict=True)}
-        lines += _body(part, words) + _wrapped([".subckt", f"circuit{k}", *pins])
-        lines += [*_cards(part, words), f".ends circuit{k}"]
-        lines += _wrapped([f"X{k}", *nets.values(), f"circuit{k}"])
-        lines += [f"V{nets[port]} {nets[port]} 0 {_volts(port, volts)}" for port, volts in drive.items()]
-    return "\n".join([*lines, ".op", ".end"]) + "\n"
-
-
-def _settings(part: Circuit, drive: Mapping[str, float]) -> dict[str, float | None]:
-    """Return what each port is held at, None where it is open; islands without a driven port have all ports at 0 V."""
-    island = islands(part)
-    touched = set(island[port_nodes(part, drive)].tolist())
-    return {
-        port: drive.get(port, None if island[node] in touched else 0.0)
-        for port, node in zip(part.ports, part.port_node.tolist(), strict=True)
-    }
 
 
 def _volts(port: str, volts: float) -> str:

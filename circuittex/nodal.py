@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import SuperLU, splu
 
 from circuittex.circuit import Circuit, islands, port_nodes
 from circuittex.errors import CircuitError
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import Floats, Ints
+
+_UNBALANCED = 1e-8
+"""Port currents whose sum exceeds this fraction of the largest are not a solution of Kirchhoff's laws."""
+_REFINEMENTS = 6
+"""Steps of iterative refinement at most; one or two are enough unless conductances differ by ten decades."""
+_SAMPLES = 8
+_NO_ENERGY = float(16.0 * np.finfo(float).eps) ** 2
+"""G times this, at 1 V, is what rounding makes of the current where both voltages of its energy product are zero."""
 
 
 @frozen
@@ -37,28 +46,33 @@ class PortBasis:
     flow: Floats
     """(R, D) currents G Δφ through the resistors, S."""
 
-    @property
-    def admittance(self) -> Floats:
-        """(D, D) Y[p, q] = Σ G Δφ_p Δφ_q, S: current into port p for one volt at port q, the others at 0 V."""
-        return self.flow.T @ self._drop(self.potential)
-
     def solve(self, drive: Mapping[str, float]) -> NodalSolution:
         """Return the solution for voltages at exactly these driven ports.
 
         The current into port p is the energy product Σ G Δφ_p ΔV. It equals the sum of the currents that leave the
         port, but that sum loses the digits of ΔV where a port hangs on a tiny resistor. Voltages are taken from the
         first port, so that what all ports have in common costs no digits either.
+
+        Raises `CircuitError` where the currents break Kirchhoff's law: they do not add up to zero.
         """
         volts = np.array([drive[port] for port in self.ports], dtype=np.float64)
         above = self.potential @ (volts - volts[0])
         current = np.zeros(len(self.circuit.ports))
-        current[[self.circuit.ports.index(port) for port in self.ports]] = self.flow.T @ self._drop(above)
+        drop = self.circuit.resistance * (self.flow @ (volts - volts[0]))
+        current[[self.circuit.ports.index(port) for port in self.ports]] = self.flow.T @ drop
+        self._refuse_unbalanced(current, volts)
         return NodalSolution(voltage=above + volts[0], port_current=current)
 
-    def _drop(self, voltage: Floats) -> Floats:
-        i, j = self.circuit.resistor_nodes.T
-        difference: Floats = voltage[i] - voltage[j]
-        return difference
+    def _refuse_unbalanced(self, current: Floats, volts: Floats) -> None:
+        """Raise where the currents do not add up to zero; currents that are all rounding are as good as none."""
+        largest = np.abs(current).max(initial=0.0)
+        nothing = _NO_ENERGY * float(np.sum(1.0 / self.circuit.resistance)) * float(np.ptp(volts))
+        if not abs(current.sum()) <= max(_UNBALANCED * largest, nothing):
+            raise CircuitError(
+                f"singular: the port currents add up to {float(current.sum()):.3g} A and the largest is "
+                f"{float(largest):.3g} A: resistances between {float(self.circuit.resistance.min()):.1e} and "
+                f"{float(self.circuit.resistance.max()):.1e} ohm are too far apart for a nodal solution"
+            )
 
 
 def solve_nodal(circuit: Circuit, drive: Mapping[str, float]) -> NodalSolution:
@@ -90,23 +104,85 @@ def solve_drives(circuit: Circuit, drives: Sequence[Mapping[str, float]]) -> tup
 
 
 def port_basis(circuit: Circuit, ports: Sequence[str]) -> PortBasis:
-    """Factorise the circuit with these ports held, and return its response to one volt at each of them."""
+    """Factorise the circuit with these ports held, and return its response to one volt at each of them.
+
+    Between nodes that a large conductance joins, the drop is far smaller than the voltages and would lose its digits
+    in their difference. So voltages are kept as a rounded part, whose differences are exact there, and a small rest
+    that iterative refinement finds.
+    """
+    grounded = _grounded(circuit, ports)
+    potential = np.zeros((circuit.n_nodes, len(grounded.fixed)))
+    potential[grounded.fixed, np.arange(len(grounded.fixed))] = 1.0
+    potential -= grounded.response(grounded.flow(potential))
+    rest = np.zeros_like(potential)
+    flow = grounded.flow(potential)
+    for _ in range(_REFINEMENTS):
+        step = grounded.response(flow)
+        rest -= step
+        flow = grounded.flow(potential) + grounded.flow(rest)
+        if np.abs(step).max(initial=0.0) <= np.finfo(float).eps ** 2:
+            break
+    return PortBasis(circuit=circuit, ports=tuple(ports), potential=potential + rest, flow=flow)
+
+
+def rounding_errors(circuit: Circuit, drive: Mapping[str, float]) -> tuple[float, Floats]:
+    """Return what rounding does to a simulator's answer: voltage, V per V, and current (D,) of each driven port, S.
+
+    One solution in double precision, unrefined as in a simulator, satisfies Kirchhoff's law at each node up to
+    eps Σ G, the largest terms it adds there (eps = 2.2e-16). How far such errors carry depends on the circuit: a yarn
+    on contacts of little conductance floats on them. So errors of this size and random sign, in eight samples, are
+    sent through the solution. What ngspice was measured to err by, on woven cells with sigma_c from 1e-10 to 10
+    S/mm2 and 138 to 484 resistors, lies between 0.01 and 0.4 of the largest sample, over 11 decades.
+    """
+    grounded = _grounded(circuit, tuple(drive))
+    eps = float(np.finfo(float).eps)
+    at_node = abs(grounded.difference).T @ grounded.conductance
+    sign = np.random.default_rng(0).choice([-1.0, 1.0], (len(grounded.inner), _SAMPLES))
+    voltage = np.zeros((circuit.n_nodes, _SAMPLES))
+    voltage[grounded.inner] = eps * grounded.solve(sign * at_node[grounded.inner, None])
+    out = grounded.difference[:, grounded.fixed].T @ grounded.flow(voltage)
+    current: Floats = np.abs(out).max(axis=1) + eps * at_node[grounded.fixed]
+    return float(np.abs(voltage).max(initial=0.0)), current
+
+
+@dataclass(frozen=True)
+class _Grounded:
+    """The factorised equations of a circuit with some nodes held."""
+
+    fixed: Ints
+    inner: Ints
+    difference: csc_array
+    conductance: Floats
+    lu: SuperLU | None
+
+    def flow(self, potential: Floats) -> Floats:
+        """Currents G Δφ (R, D)."""
+        flow: Floats = self.conductance[:, None] * (self.difference @ potential)
+        return flow
+
+    def solve(self, injected: Floats) -> Floats:
+        """Voltages of the inner nodes for currents into them."""
+        solution: Floats = injected if self.lu is None else self.lu.solve(injected)
+        return solution
+
+    def response(self, flow: Floats) -> Floats:
+        """Voltages (K, D) that carry the current which these flows leave over at the inner nodes."""
+        voltage = np.zeros((self.difference.shape[1], flow.shape[1]))
+        voltage[self.inner] = self.solve(self.difference[:, self.inner].T @ flow)
+        return voltage
+
+
+def _grounded(circuit: Circuit, ports: Sequence[str]) -> _Grounded:
     fixed = port_nodes(circuit, ports)
     _refuse_islands(circuit, fixed)
     inner = np.setdiff1d(np.arange(circuit.n_nodes), fixed)
     difference = _incidence(circuit)
     conductance = 1.0 / circuit.resistance
-    potential = np.zeros((circuit.n_nodes, len(fixed)))
-    potential[fixed, np.arange(len(fixed))] = 1.0
+    lu = None
     if len(inner):
         inwards = difference[:, inner].T.tocsr()
-        laplacian = (inwards * conductance) @ difference[:, inner]
-        lu = splu(laplacian.tocsc(), permc_spec="COLAMD")
-        for _ in range(2):  # the second pass is one step of iterative refinement
-            flow = conductance[:, None] * (difference @ potential)
-            potential[inner] -= lu.solve(inwards @ flow)
-    flow = conductance[:, None] * (difference @ potential)
-    return PortBasis(circuit=circuit, ports=tuple(ports), potential=potential, flow=flow)
+        lu = splu(((inwards * conductance) @ difference[:, inner]).tocsc(), permc_spec="COLAMD")
+    return _Grounded(fixed, inner, difference, conductance, lu)
 
 
 def _incidence(circuit: Circuit) -> csc_array:

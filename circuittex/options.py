@@ -26,7 +26,7 @@ def build_parser() -> argparse.ArgumentParser:
             "  circuittex new > weave.toml\n"
             "  circuittex run weave.toml --out results/weave\n"
             "then open results/weave/report.html. 'circuittex COMMAND --help' explains a command.\n\n"
-            "exit codes: 0 done, 1 'verify' found a difference, 2 unusable input, 130 interrupted"
+            "exit codes: 0 done, 1 routes disagree ('run', 'verify'), 2 unusable input, 130 interrupted"
         ),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -76,7 +76,9 @@ def _add_run(commands: Commands) -> None:
         "Relaxes the woven cell of DESIGN, follows its loading paths, and for every recorded state solves\n"
         "voltage and temperature for each probe, writes the netlists, has ngspice confirm them and fits Ry and\n"
         "Rc. Leaves in DIR: summary.json, report.html, the netlists, all results in HDF5, figures, and files\n"
-        "for ParaView. States are written one by one: what an interrupted run has finished stays usable.",
+        "for ParaView. States are written one by one: what an interrupted run has finished stays usable.\n"
+        "What an earlier run left in DIR is removed first. Exit code 1 where routes differ by more than 1e-9;\n"
+        "without ngspice the run completes and says that it did not check.",
         "circuittex run examples/plain_weave.toml --out results/plain_weave",
     )
     parser.add_argument("design", metavar="DESIGN", type=Path, help="design file (TOML); see 'circuittex new'")
@@ -102,7 +104,7 @@ def _add_netlist(commands: Commands) -> None:
         default="subckt",
         help="sub-circuit (default), runnable deck of one probe, or the reduced network as a sub-circuit",
     )
-    parser.add_argument("--probe", metavar="NAME", help="probe of a deck (default: the first of the design)")
+    parser.add_argument("--probe", metavar="NAME", help="probe of '--kind deck' (default: the first of the design)")
     parser.add_argument(
         "--resolution",
         choices=("merged", "full"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Iterable
 
@@ -11,12 +12,15 @@ _UNSAFE_RUN = re.compile(r"[^a-z0-9]+")
 _RESERVED = frozenset({"gnd", "ground"})
 # PySpice and some simulators have line buffers: nobody needs longer words.
 _LONGEST = 80
+# What stands for the text that a long word leaves out: enough digits that no two texts of a design share them.
+_DIGITS = 12
 
 
 def safe_name(text: str) -> str:
     """Return `text` as a word of lower-case ASCII letters, digits and underscores that starts with a letter.
 
     A last '-' or '+' names a yarn end and is spelt out; every other run of odd characters becomes one underscore.
+    A word of more than 80 characters is cut, and ends in a hash of all of them: long names that differ stay different.
 
     >>> safe_name("warp2-"), safe_name("Weft 1\\n.end;$*"), safe_name("2"), safe_name("gnd")
     ('warp2_minus', 'weft_1_end', 'n_2', 'n_gnd')
@@ -26,8 +30,13 @@ def safe_name(text: str) -> str:
     word = text.lower()
     if word.endswith(("-", "+")):
         word = f"{word[:-1]}_{'minus' if word[-1] == '-' else 'plus'}"
-    word = _UNSAFE_RUN.sub("_", word).strip("_")[:_LONGEST].rstrip("_")
-    return word if word and word[0].isalpha() and word not in _RESERVED else f"n_{word}".rstrip("_")
+    word = _UNSAFE_RUN.sub("_", word).strip("_")
+    if not word or not word[0].isalpha() or word in _RESERVED:
+        word = f"n_{word}".rstrip("_")
+    if len(word) <= _LONGEST:
+        return word
+    digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:_DIGITS]
+    return f"{word[: _LONGEST - _DIGITS - 1].rstrip('_')}_{digest}"
 
 
 def unique_names(names: Iterable[str]) -> tuple[str, ...]:

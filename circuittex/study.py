@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 import numpy as np
 
 from circuittex import __version__
 from circuittex.contact.extract import contacts_of
-from circuittex.design import Design, design_hash
-from circuittex.export import simplified, write_netlists
+from circuittex.design import Design, Loading, design_hash
+from circuittex.export import simplified, state_word, write_netlists
 from circuittex.fields import solve_probes
 from circuittex.fit import fit_network
 from circuittex.geometry.levels import levels
@@ -20,6 +20,7 @@ from circuittex.geometry.mesh import Floats
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.linear import LinearSolver, best_solver
+from circuittex.plot import FIGURES
 from circuittex.relaxation import Equilibrium, clamp_force, move, relax
 from circuittex.report import write_report
 from circuittex.results import Record, Study
@@ -31,6 +32,13 @@ from circuittex.vtu import write_collections, write_vtu
 
 RESULTS = "results.h5"
 """Name of the HDF5 file in the output folder."""
+MARKS = {
+    "netlists/*.sub": b"* circuittex ",
+    "netlists/*.cir": b"* circuittex ",
+    "vtu/*.vtu": b'"contact_line_load_N_per_mm"',
+    "vtu/*.pvd": b"<!--circuittex-->",
+}
+"""What tells the files of a run, whose names depend on its design, from those that somebody else put beside them."""
 
 
 def run_study(
@@ -44,7 +52,8 @@ def run_study(
 
     With `out`, everything is left in that folder: the HDF5 file grows state by state, so what an interrupted
     run has completed is kept; netlists and VTU files are written with each state, summary, figures and report
-    at the end. `progress` is told in words what is being done.
+    at the end. What an earlier run left in the folder is removed first, other files are left alone. `progress` is
+    told in words what is being done.
 
     Raises `ConvergenceError` where an equilibrium is not found.
     """
@@ -61,6 +70,7 @@ def run_study(
     )
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
+        remove_results(folder)
         write_study_start(folder / RESULTS, study)
     for name, path, strain, gradient, equilibrium in _states(study, solver or best_solver(), say):
         say(f"{name}: fields, netlists and verification")
@@ -130,9 +140,8 @@ def _states(
 
     relaxed = relax(mesh, design, solver=solver, report=report("relaxed"))
     yield "relaxed", "", 0.0, rest, relaxed
-    for loading in design.loading:
+    for loading, names in zip(design.loading, state_names(design.loading), strict=True):
         now, before = relaxed, rest
-        names = state_names(loading.name, loading.strains)
         for name, strain, target in zip(names, loading.strains, loading.gradients, strict=True):
             after = np.array(target)
             start = move(now.configuration, before, after)
@@ -140,19 +149,40 @@ def _states(
             yield name, loading.name, strain, after, now
 
 
-def state_names(loading: str, strains: tuple[float, ...]) -> tuple[str, ...]:
-    """A name for each state of a loading path: the path's name and the strain, numbered where a strain recurs.
+def state_names(loading: Sequence[Loading]) -> tuple[tuple[str, ...], ...]:
+    """A name for each state of each loading path: the path's name and the strain, numbered where one recurs.
 
-    >>> state_names("cycle", (0.05, 0.1, 0.05))
-    ('cycle-0.05', 'cycle-0.1', 'cycle-0.05-2')
+    Names are unique over the whole study, in files and as words of a netlist, which know neither case nor signs.
+
+    >>> from circuittex.design import shear
+    >>> state_names([shear("cycle", (0.05, 0.1, 0.05)), shear("back", (-0.05,))])
+    (('cycle-0.05', 'cycle-0.1', 'cycle-0.05-2'), ('back--0.05',))
     """
-    seen: Counter[str] = Counter()
-    names = []
-    for strain in strains:
-        name = f"{loading}-{strain:.6g}"
-        seen[name] += 1
-        names.append(name if seen[name] == 1 else f"{name}-{seen[name]}")
-    return tuple(names)
+    taken: set[str] = set()
+
+    def unique(name: str) -> str:
+        choices = (name if number == 1 else f"{name}-{number}" for number in count(1))
+        free = next(choice for choice in choices if state_word(choice) not in taken)
+        taken.add(state_word(free))
+        return free
+
+    return tuple(tuple(unique(f"{path.name}-{strain:.6g}") for strain in path.strains) for path in loading)
+
+
+def remove_results(folder: Path) -> None:
+    """Remove what a run left in `folder`, so that no stale result can pass for one of the next run.
+
+    Files in the same places that circuittex did not write stay. The HDF5 file goes last: until then the folder
+    can be completed again from it.
+    """
+    made = [path for pattern, mark in MARKS.items() for path in folder.glob(pattern) if _holds(path, mark)]
+    made += [folder / "figures" / f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")]
+    for path in (*made, folder / "report.html", folder / "summary.json", folder / RESULTS):
+        path.unlink(missing_ok=True)
+
+
+def _holds(path: Path, mark: bytes) -> bool:
+    return path.is_file() and mark in path.read_bytes()
 
 
 def centre_crossing(design: Design) -> tuple[int, float]:

@@ -38,8 +38,10 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
         node voltage, V per volt of the probe; ``max_current_difference``: in a terminal current, relative;
         ``reduced_difference``: of the reduced network's currents between the fit and ngspice, relative;
         ``merge_error``: largest relative change of a probe current by merging contacts; ``field_difference``: largest
-        relative difference of a probe current between the mechanical mesh and the circuit; ``ngspice_checked``: whether
-        ngspice confirmed the state; ``note``: why it did not
+        relative difference of a probe current between the mechanical mesh and the circuit; ``native_difference``: the
+        largest difference without ngspice; ``ngspice_limit``: the difference that ngspice's rounding explains;
+        ``ngspice_checked``: whether ngspice answered; ``confirmed``: whether it did and all routes agree; ``note``: why
+        not
 """
 
 from __future__ import annotations
@@ -54,6 +56,7 @@ import numpy as np
 
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results import Record, Study
+from circuittex.verify import AGREEMENT
 
 FORMAT = 1
 
@@ -97,18 +100,63 @@ def table(study: Study) -> str:
 
 
 def ngspice_statement(study: Study) -> tuple[str, ...]:
-    """Sentences that say which states ngspice confirmed, and why not the others."""
+    """Sentences that say which states ngspice confirmed, where routes disagree, and what ngspice did not check."""
+    if study.records and not study.design.probes:
+        return ("The design has no probes: there are no currents to confirm.",)
+    wrong = [record for record in study.records if not agrees(record)]
     unchecked = [record for record in study.records if not record.verification.ngspice_checked]
-    if not unchecked:
-        return ("ngspice confirmed every recorded state.",)
-    which = "any state" if len(unchecked) == len(study.records) else ", ".join(record.name for record in unchecked)
-    reasons = dict.fromkeys(record.verification.note for record in unchecked if record.verification.note)
-    return (f"ngspice did NOT check {which}: the results rest on circuittex's own solvers.", *reasons)
+    sentences = []
+    if wrong:
+        worst = max(wrong, key=lambda record: np.nan_to_num(difference(record), nan=np.inf))
+        sentences.append(
+            f"The routes DISAGREE in {', '.join(record.name for record in wrong)}, by up to {difference(worst):.1e}: "
+            "do not trust the results."
+        )
+    if unchecked:
+        sentences.append(
+            f"ngspice did NOT check {_which(study, unchecked)}: the results rest on circuittex's own solvers."
+        )
+    sound = [record for record in study.records if record.verification.ngspice_checked and agrees(record)]
+    reduced = [record for record in sound if not confirmed(record)]
+    if reduced:
+        sentences.append(f"ngspice did NOT check the reduced network of {_which(study, reduced)}.")
+    if not sentences:
+        sentences.append("ngspice confirmed every recorded state.")
+    limit = max((record.verification.ngspice_limit for record in study.records), default=0.0)
+    if limit > AGREEMENT:
+        sentences.append(f"ngspice's own rounding limits this check to {limit:.1e}.")
+    sentences += [record.verification.note for record in unchecked if record.verification.note]
+    return tuple(dict.fromkeys(sentences))
+
+
+def agrees(record: Record) -> bool:
+    """Whether the routes that answered say the same, about the detailed and, if there is one, the reduced network.
+
+    ngspice's rounding in the reduced network is less than in the detailed one, whose segments are shorter.
+    """
+    loosest = max(AGREEMENT, record.verification.ngspice_limit)
+    return record.verification.agrees and not record.reduced_difference > loosest
+
+
+def confirmed(record: Record) -> bool:
+    """Whether ngspice answered and all routes agree; the reduced network counts where Ry and Rc are finite."""
+    answered = np.isfinite(record.reduced_difference) or not np.isfinite([record.fit.Ry, record.fit.Rc]).all()
+    return record.verification.ngspice_checked and agrees(record) and bool(answered)
+
+
+def _which(study: Study, records: list[Record]) -> str:
+    """Names of the states that something was not done for."""
+    return "any state" if len(records) == len(study.records) else ", ".join(record.name for record in records)
 
 
 def difference(record: Record) -> float:
-    """The largest difference between two routes, in node voltage per volt or relative current; nan if one is nan."""
-    return float(np.max([record.verification.max_voltage_difference, record.verification.max_current_difference]))
+    """The largest difference between two routes, in node voltage per volt or relative current; nan if one is nan.
+
+    That of the reduced network counts where ngspice solved it.
+    """
+    verification = record.verification
+    reduced = record.reduced_difference if np.isfinite(record.reduced_difference) else 0.0
+    return float(np.max([verification.max_voltage_difference, verification.max_current_difference, reduced]))
 
 
 def insulated_resistance(mesh: FibrilMesh) -> float:
@@ -153,7 +201,10 @@ def _state(record: Record) -> dict[str, Any]:
             "reduced_difference": record.reduced_difference,
             "merge_error": verification.merge_error,
             "field_difference": verification.field_difference,
+            "native_difference": verification.native_difference,
+            "ngspice_limit": verification.ngspice_limit,
             "ngspice_checked": verification.ngspice_checked,
+            "confirmed": confirmed(record),
             "note": verification.note,
         },
     }

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import combinations
 from typing import ParamSpec, TypeVar
 
 import numpy as np
@@ -20,13 +19,16 @@ from circuittex.geometry.mesh import Floats
 from circuittex.geometry.refine import refined
 from circuittex.netlist import deck, pin_names
 from circuittex.ngspice import run_decks
-from circuittex.nodal import solve_nodal
+from circuittex.nodal import rounding_errors, solve_nodal
 
 AGREEMENT = 1e-9
 """Routes on the same discretisation that differ by more than this (relative current, V per V) do not agree."""
 
 NO_CURRENT = 1e-6
 """A probe with less than this fraction of the largest probe current is measured against the largest."""
+
+NOTHING = 1e-12
+"""A probe with less than this fraction of an insulated yarn's current carries none: it is measured against that."""
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -42,6 +44,11 @@ class Verification:
     """Largest difference of two routes in one node voltage, V per volt of the probe."""
     max_current_difference: float
     """Largest difference of two routes in one terminal current, relative to the current of that probe."""
+    native_difference: float
+    """Largest difference between finite elements and nodal analysis alone, in voltage (V per V) or relative current."""
+    ngspice_limit: float
+    """Difference that ngspice's rounding explains, in voltage (V per V) or relative current; 0 where it did not
+    check."""
     merge_error: float
     """Largest relative change of a probe current by the simplification of the contacts."""
     field_difference: float
@@ -57,6 +64,13 @@ class Verification:
     """Whether ngspice answered every probe and its answers were compared."""
     note: str
     """What a reader must know, such as why ngspice did not check or that routes disagree; empty if all is well."""
+
+    @property
+    def agrees(self) -> bool:
+        """Whether all routes agree: to `AGREEMENT`, and ngspice to its rounding where that is coarser."""
+        loosest = max(AGREEMENT, self.ngspice_limit)
+        differences = self.max_voltage_difference, self.max_current_difference
+        return self.native_difference <= AGREEMENT and all(difference <= loosest for difference in differences)
 
 
 @frozen
@@ -83,38 +97,57 @@ def verify(
     All three solve the `simplified` contacts, each from them alone; finite elements and nodal analysis also
     solve all `contacts`, and the differences are the largest of either. Every probe has a circuit of its own,
     since it joins only its own two terminals. ngspice answers all of them in one process within `timeout`
-    seconds; where it does not, `ngspice_checked` is False and `note` says why. `fields` are the finite element
-    solutions on all `contacts` with the mesh "feet", for whoever has them already.
+    seconds; where it does not, `ngspice_checked` is False and `note` says why. Its double precision is not refined,
+    so that the circuit limits what it can confirm (`ngspice_limit`, see `rounding_errors`); the limit never loosens
+    the comparison of the other two. `fields` are the finite element solutions on all `contacts` with the mesh
+    "feet", for whoever has them already.
     """
     if not probes:
         nan = float("nan")
-        return Verification((), nan, nan, nan, nan, 0.0, 0.0, nan, False, "there are no probes to verify")
+        return Verification((), nan, nan, nan, 0.0, nan, nan, 0.0, 0.0, nan, False, "there are no probes to verify")
     clock = _Clock()
     coarse = clock("fields", solve_probes, contacts, terminals, probes, mesh="mechanical")
     _, full_fields, full_nodal = _native(clock, contacts, terminals, probes, fields)
     circuits, *answers = _native(clock, simplified, terminals, probes, None)
     routes = dict(zip(("fields", "nodal"), answers, strict=True))
-    note = ""
+    yarn = _yarn_currents(contacts, probes)
+    native = _difference(full_fields, full_nodal, yarn), _difference(answers[0], answers[1], yarn)
+    note, limit, with_ngspice = "", 0.0, []
     try:
         routes["ngspice"] = clock("ngspice", _ngspice, circuits, probes, timeout)
+        limit = _ngspice_limit(circuits, probes, routes["nodal"], yarn)
+        with_ngspice = [_difference(answer, routes["ngspice"], yarn) for answer in answers]
     except NgspiceError as error:
         note = f"ngspice did not check this state: {error}"
-    compared = [(full_fields, full_nodal), *combinations(routes.values(), 2)]
-    voltage, current = np.max([_difference(a, b) for a, b in compared], axis=0)
-    if not (voltage <= AGREEMENT and current <= AGREEMENT):
-        note = f"the routes disagree: {voltage:.1e} V per V, currents {current:.1e} relative. {note}".strip()
-    return Verification(
+    voltage, current = np.max([*native, *with_ngspice], axis=0)
+    found = Verification(
         routes=tuple(routes),
         max_voltage_difference=float(voltage),
         max_current_difference=float(current),
-        merge_error=_relative([a.current for a in routes["fields"]], [a.current for a in full_fields]),
-        field_difference=_relative([f.currents[0] for f in coarse], [a.current for a in full_nodal]),
+        native_difference=float(np.max(native)),
+        ngspice_limit=limit,
+        merge_error=_relative([a.current for a in routes["fields"]], [a.current for a in full_fields], yarn),
+        field_difference=_relative([f.currents[0] for f in coarse], [a.current for a in full_nodal], yarn),
         fields_seconds=clock.seconds["fields"],
         nodal_seconds=clock.seconds["nodal"],
         ngspice_seconds=clock.seconds["ngspice"] if "ngspice" in routes else float("nan"),
         ngspice_checked="ngspice" in routes,
         note=note,
     )
+    return replace(found, note=_note(found))
+
+
+def _note(found: Verification) -> str:
+    """The note with what the differences add to it."""
+    sentences = [found.note] if found.note else []
+    if found.ngspice_limit > AGREEMENT:
+        sentences.insert(0, f"ngspice's own rounding limits this check to {found.ngspice_limit:.1e}.")
+    if not found.agrees:
+        differences = (
+            f"{found.max_voltage_difference:.1e} V per V, currents {found.max_current_difference:.1e} relative"
+        )
+        sentences.insert(0, f"the routes disagree: {differences}.")
+    return " ".join(sentences)
 
 
 def field_convergence(
@@ -125,7 +158,7 @@ def field_convergence(
     The nodes of the mechanical mesh, then two and four times as many; the error is the largest relative
     difference of a probe current from `fields`, the solutions on the mesh "feet", which equal the circuit.
     """
-    exact = [f.currents[0] for f in fields]
+    exact, yarn = [f.currents[0] for f in fields], _yarn_currents(contacts, probes)
     mesh, rows = contacts.mesh, []
     distance = float((mesh.length / (np.diff(mesh.first_node) - 1)).max())
     for pieces in (1, 2, 4):
@@ -133,7 +166,7 @@ def field_convergence(
             contacts, mesh=refined(mesh, pieces), axial_factor=np.repeat(contacts.axial_factor, mesh.order * pieces)
         )
         currents = [f.currents[0] for f in solve_probes(finer, terminals, probes, mesh="mechanical")]
-        rows.append((distance / pieces, _relative(currents, exact)))
+        rows.append((distance / pieces, _relative(currents, exact, yarn)))
     return np.array(rows)
 
 
@@ -207,17 +240,43 @@ def _ngspice(circuits: Sequence[Circuit], probes: Sequence[Probe], timeout: floa
     return answers
 
 
-def _difference(a: Sequence[_Answer], b: Sequence[_Answer]) -> tuple[float, float]:
+def _ngspice_limit(
+    circuits: Sequence[Circuit], probes: Sequence[Probe], known: Sequence[_Answer], yarn: Floats
+) -> float:
+    """What ngspice's rounding may change in a voltage (V per V) or relative current of any probe."""
+    errors = [rounding_errors(c, {p.source: 1.0, p.sink: 0.0}) for c, p in zip(circuits, probes, strict=True)]
+    current = np.array([error[0] for _, error in errors]) * np.abs([probe.voltage for probe in probes])
+    scale = _scale([answer.current for answer in known], yarn)
+    relative = np.divide(current, scale, out=np.zeros(len(probes)), where=scale > 0.0)
+    return float(np.max([*(voltage for voltage, _ in errors), *relative], initial=0.0))
+
+
+def _difference(a: Sequence[_Answer], b: Sequence[_Answer], yarn: Floats) -> tuple[float, float]:
     """Largest difference of two routes in node voltage and in relative current, over all probes."""
     voltage = [np.max(np.abs(x.voltage - y.voltage), initial=0.0) for x, y in zip(a, b, strict=True)]
-    return float(np.max(voltage, initial=0.0)), _relative([x.current for x in a], [y.current for y in b])
+    return float(np.max(voltage, initial=0.0)), _relative([x.current for x in a], [y.current for y in b], yarn)
 
 
-def _relative(values: Sequence[float], reference: Sequence[float]) -> float:
-    """Largest difference relative to each reference or, for those that are nothing beside it, to the largest."""
-    scale = np.abs(np.asarray(reference, dtype=np.float64))
-    largest = scale.max(initial=0.0)
-    scale = np.where(scale > NO_CURRENT * largest, scale, largest)
+def _yarn_currents(contacts: ContactState, probes: Sequence[Probe]) -> Floats:
+    """What the best of the yarns would carry alone at the voltage of each probe, A."""
+    mesh = contacts.mesh
+    conductance = np.bincount(mesh.yarn, mesh.electrical_conductivity * mesh.area / mesh.length)
+    currents: Floats = conductance.max(initial=0.0) * np.abs(np.array([probe.voltage for probe in probes]))
+    return currents
+
+
+def _relative(values: Sequence[float], reference: Sequence[float], yarn: Floats) -> float:
+    """Largest difference relative to each reference or, for those that are nothing beside others, to those."""
+    scale = _scale(reference, yarn)
     difference = np.abs(np.asarray(values) - np.asarray(reference))
     relative = np.divide(difference, scale, out=np.where(difference > 0.0, np.inf, 0.0), where=scale > 0.0)
     return float(np.max(relative, initial=0.0))
+
+
+def _scale(currents: Sequence[float], yarn: Floats) -> Floats:
+    """What the difference of each current is measured against."""
+    size = np.abs(np.asarray(currents, dtype=np.float64))
+    largest = size.max(initial=0.0)
+    usual = np.where(size > NO_CURRENT * largest, size, largest)
+    scale: Floats = np.where(usual > NOTHING * yarn, usual, yarn)
+    return scale

@@ -22,16 +22,23 @@ def write_vtu(path: str | Path, mesh: FibrilMesh, record: Record, sides: int = S
 
     The surface is r + R cos t g1 + R sin t g2 [9], `sides` quadrilaterals around and one for each piece between
     neighbouring mesh nodes along a fibril. Cell data: ``fibril``, ``yarn``, ``section_force_N``,
-    ``contact_line_load_N_per_mm`` and for each probe ``current_A <probe>`` along +xi (mean over the piece). Point data:
-    ``xi_mm`` and for each probe ``temperature_K <probe>`` and ``potential_V <probe>`` (nan where undefined).
+    ``nominal_stress_MPa``, ``contact_line_load_N_per_mm`` and for each probe ``current_A <probe>`` along +xi (mean over
+    the piece). Point data: ``xi_mm`` and for each probe ``temperature_K <probe>`` and ``potential_V <probe>`` (nan
+    where undefined).
+
+    The stress is nominal, |∫ P E3 dA| / (pi R^2) in N/mm2: the magnitude of the force that a section carries, tension
+    or compression and shear together, over its undeformed area. It is a mean over the section: bending, whose stresses
+    cancel there, does not show.
     """
     nodes = tubes.spans(mesh)
     fibril = mesh.node_fibril
+    force = record.section_force[tubes.span_element(mesh)]
     node_data = {"xi_mm": mesh.xi}
     span_data = {
         "fibril": fibril[nodes[:, 0]],
         "yarn": mesh.yarn[fibril[nodes[:, 0]]],
-        "section_force_N": record.section_force[tubes.span_element(mesh)],
+        "section_force_N": force,
+        "nominal_stress_MPa": force / mesh.area[fibril[nodes[:, 0]]],
         "contact_line_load_N_per_mm": tubes.span_load(record.contacts),
     }
     for fields in record.fields:
@@ -78,6 +85,7 @@ def write_collections(folder: str | Path, records: Sequence[Record]) -> tuple[Pa
 def write_pvd(path: str | Path, entries: Iterable[tuple[float, str]]) -> None:
     """Write a ParaView collection: (strain, VTU file relative to the collection) for each state, strain as time."""
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
+    root.append(ElementTree.Comment("circuittex"))
     collection = ElementTree.SubElement(root, "Collection")
     for strain, file in entries:
         ElementTree.SubElement(collection, "DataSet", timestep=repr(strain), group="", part="0", file=file)

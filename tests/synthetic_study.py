@@ -96,6 +96,8 @@ def _record(
             routes=("fields", "nodal", "ngspice"),
             max_voltage_difference=4e-13,
             max_current_difference=2e-12,
+            native_difference=3e-13,
+            ngspice_limit=5e-12,
             merge_error=0.004,
             field_difference=0.011,
             fields_seconds=0.4,

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fabrics import fibrils_through, straight
 
+from circuittex.contact.curve import curve_table
 from circuittex.design import design_hash, load_design, parse_design, starter
 from circuittex.errors import DesignError
 from circuittex.geometry import build_mesh
@@ -36,6 +38,7 @@ def changed(*changes: tuple[Keys, Any]) -> dict[str, Any]:
 LOADING: Keys = ("loading", 0)
 YARN: Keys = ("yarns", "conductive")
 MATERIAL: Keys = ("materials", "fibril")
+ONE_CROSSING: list[tuple[Keys, Any]] = [(("weave", "draft"), [[1]]), (("terminals",), {}), (("probes",), [])]
 PATH = (LOADING, {"name": "p", "kind": "path"})
 
 # keys and values that are changed, field of the error, a phrase of what is allowed
@@ -179,6 +182,16 @@ BAD: list[tuple[list[tuple[Keys, Any]], str, str]] = [
     ([(("numerics", "tolerance"), 0)], "numerics.tolerance", "> 0 N"),
     ([(("numerics", "max_iterations"), 0)], "numerics.max_iterations", "from 1"),
     ([(("numerics", "merge_length"), -1)], "numerics.merge_length", ">= 0 mm"),
+    ([(("numerics", "merge_length"), 8.1)], "numerics.merge_length", "at most 8 mm, the length of the longest fibril"),
+    ([(("numerics", "merge_length"), "1 m")], "numerics.merge_length", "at most 8 mm"),
+    ([(("numerics", "snap_length"), -1)], "numerics.snap_length", ">= 0 mm"),
+    ([(("numerics", "snap_length"), 9)], "numerics.snap_length", "at most 0.04 mm, a tenth of the shortest element"),
+    ([(("numerics", "snap_length"), "0.041 mm")], "numerics.snap_length", "at most 0.04 mm"),
+    (
+        [*ONE_CROSSING, (("numerics", "elements"), 2), (("numerics", "order"), 1)],
+        "numerics.elements",
+        "2 is not usable; it must be at least 3: contact needs four nodes on every fibril, at order 1",
+    ),
     ([(("numerics", "drop_fraction"), 1.0)], "numerics.drop_fraction", "<= 0.5"),
     ([(("numerics", "element"), 20)], "numerics.element", "did you mean 'elements'?"),
     ([(("numerics",), [20])], "numerics", "must be a table"),
@@ -218,6 +231,19 @@ def test_bad_design(changes: list[tuple[Keys, Any]], field: str, phrase: str) ->
 def test_the_unchanged_design_is_accepted() -> None:
     """The table shows nothing unless its starting point is good."""
     assert build_mesh(parse_design(changed())).n_fibrils == 80
+
+
+def test_bounds_that_depend_on_the_mesh_can_be_reached() -> None:
+    """Fibrils of 8 mm in 20 elements; one crossing of fibrils of 2 mm in 3 elements of order 1."""
+    lengths = {"merge_length": 8.0, "snap_length": 0.04}
+    parse_design(changed(*((("numerics", key), value) for key, value in lengths.items())))
+    parse_design(changed(*ONE_CROSSING, (("numerics", "elements"), 3), (("numerics", "order"), 1)))
+
+
+def test_a_mesh_made_by_hand_with_too_few_nodes_is_told_their_number() -> None:
+    mesh = fibrils_through([straight([0, 0, 0], [1, 0, 0], 9), straight([0, 1, 0], [1, 1, 0], 2)])
+    with pytest.raises(DesignError, match=r"^nodes of a fibril: 3 is not usable; contact needs four nodes"):
+        curve_table(mesh)
 
 
 def places(value: Any, here: Keys = ()) -> list[Keys]:

@@ -83,7 +83,7 @@ def test_segments_integrate_a_factor_that_jumps_between_elements():
 
 
 def test_short_segments_far_from_the_start_keep_their_digits():
-    near = 8.0 - 1e-9
+    near = 8.0 - 1e-8
     contacts = touching(fibrils([8.0, 8.0], [1.0, 1.0], elements=20), [(0, 1, near, 4.0, 1.0)], [0.7] * 40)
     circuit = build_circuit(contacts, [end(1, -1)])
     assert circuit.node_xi[circuit.resistor_nodes[1]].tolist() == [near, 8.0]
@@ -114,6 +114,36 @@ def test_equal_feet_share_a_node_and_are_counted():
     assert circuit.n_nodes == 3 + 4
     # Two feet shared at 3 mm on each fibril, and one with the end at 8 mm: two + one.
     assert circuit.merged_feet == 3
+
+
+def test_feet_that_rounding_keeps_apart_share_a_node():
+    """Feet a few bits apart, and a bit away from both ends, make the circuit of feet that are equal."""
+    ulp = 2.0**-50
+    rows = [
+        (0, 1, 3.0, 5.0, 1.0),
+        (1, 0, 5.0 + 2 * ulp, 3.0 - ulp, 1.0),
+        (0, 1, ulp, 8.0 - 4 * ulp, 2.0),
+        (0, 1, 3.0 + 1e-7, 5.0, 1.0),  # far beyond rounding: a node of its own
+    ]
+    contacts = touching(fibrils([8.0, 8.0], [1.0, 1.0]), rows)
+    circuit = build_circuit(contacts, [end(1, -1), end(2, -1)])
+    assert circuit.node_xi[2:].tolist() == [3.0 - ulp, 3.0 + 1e-7, 8.0, 5.0, 8.0]
+    assert circuit.merged_feet == 5  # one of two at 3, two of three at 5, and one at an end of either fibril
+    assert circuit.resistance.min() == pytest.approx(1e-7, rel=1e-6)
+
+
+def test_conductances_below_zero_are_refused_however_small():
+    """The tolerance of a coordinate, in mm, is none for a conductance."""
+    with pytest.raises(CircuitError, match="contact 0: conductance is -1e-13"):
+        build_circuit(touching(fibrils([8.0, 8.0], [1.0, 1.0]), [(0, 1, 3.0, 3.0, -1e-13)]), [end(1, -1)])
+
+
+def test_a_foot_may_miss_the_end_of_its_own_fibril_by_rounding_only():
+    mesh = fibrils([8.0, 8e6], [1.0, 1.0])
+    circuit = build_circuit(touching(mesh, [(0, 1, -1e-12, 3.0, 1.0)]), [end(1, -1)])
+    assert np.nanmin(circuit.node_xi) == 0.0
+    with pytest.raises(CircuitError, match="xi_a is -1e-09"):
+        build_circuit(touching(mesh, [(0, 1, -1e-9, 3.0, 1.0)]), [end(1, -1)])
 
 
 def test_contacts_without_current_are_left_out_and_counted():

@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from circuittex.netlist import parse, pin_names
 from circuittex.nodal import NodalSolution, solve_nodal
 from circuittex.results import Study
 from circuittex.store import load_study, write_study_start
+from circuittex.verify import Verification
 
 COMMANDS = ["new", "run", "netlist", "verify", "report"]
 
@@ -136,6 +138,51 @@ def test_quiet_run_says_nothing(
     replace_study(monkeypatch, lambda design, out, *, progress: (progress("x"), synthetic_study(1))[1])
     assert main(["run", str(design_file), "--out", str(tmp_path / "out"), "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
+
+
+def with_verification(change: Callable[[Verification], Verification]) -> Callable[..., Study]:
+    """A run whose second state is verified with another outcome."""
+    study = synthetic_study(2, contacts=10)
+    first, second = study.records
+    records = (first, replace(second, verification=change(second.verification)))
+    return lambda *_, **__: replace(study, records=records)
+
+
+@pytest.mark.parametrize("difference", ["max_voltage_difference", "max_current_difference"])
+@pytest.mark.parametrize("value", [2e-9, float("nan")])
+def test_run_whose_routes_disagree_is_no_success(
+    difference: str,
+    value: float,
+    design_file: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    changed = {difference: value}
+    replace_study(monkeypatch, with_verification(lambda v: replace(v, **changed)))  # type: ignore[arg-type]
+    assert main(["run", str(design_file), "--out", str(tmp_path / "out"), "--quiet"]) == 1
+    text = capsys.readouterr().err
+    assert "the routes DISAGREE in stretch-0.0250:" in text
+    assert "relaxed" not in text
+
+
+def test_run_without_ngspice_completes_and_says_so(
+    design_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def unchecked(v: Verification) -> Verification:
+        return replace(v, routes=("fields", "nodal"), ngspice_checked=False, note="it is not installed")
+
+    replace_study(monkeypatch, with_verification(unchecked))
+    assert main(["run", str(design_file), "--out", str(tmp_path / "out")]) == 0
+    assert "ngspice did NOT check stretch-0.0250" in capsys.readouterr().out
+
+
+def test_run_without_probes_has_nothing_to_disagree_about(
+    design_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing = {"max_voltage_difference": float("nan"), "max_current_difference": float("nan")}
+    replace_study(monkeypatch, with_verification(lambda v: replace(v, routes=(), **nothing)))  # type: ignore[arg-type]
+    assert main(["run", str(design_file), "--out", str(tmp_path / "out"), "--quiet"]) == 0
 
 
 def test_run_refuses_a_file_as_folder(design_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -315,6 +362,20 @@ def test_deck_of_a_probe_drives_its_terminals(computed: Path, capsys: pytest.Cap
     assert main(["netlist", str(computed), "--kind", "deck", "--probe", "parallel"]) == 0
     sources = [line.split()[1:] for line in capsys.readouterr().out.splitlines() if line.startswith("V")]
     assert sources == [["parallel", "0", "1.0"], ["common", "0", "0.0"]]
+
+
+@pytest.mark.parametrize("kind", [[], ["--kind", "subckt"], ["--kind", "reduced"]])
+def test_a_probe_belongs_to_a_deck(kind: list[str], computed: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["netlist", str(computed), "--probe", "parallel", *kind]) == 2
+    assert "--probe: 'parallel' is not usable; only --kind deck is made for a probe" in error_line(capsys)
+
+
+def test_the_header_of_a_full_netlist_says_that_nothing_is_merged(
+    computed: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for kind in ("subckt", "deck"):
+        assert main(["netlist", str(computed), "--kind", kind, "--resolution", "full"]) == 0
+        assert '* note: "contact points are not merged"' in capsys.readouterr().out
 
 
 def test_reduced_netlist(computed: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -159,13 +159,48 @@ def test_probes_of_other_voltages_and_terminals_of_several_ends():
     [
         ([1.0, 0.5], "one finite number for each of 3 probes"),
         ([1.0, np.nan, 0.5], "one finite number for each of 3 probes"),
-        ([0.0, 0.0, 0.0], "at least one probe must carry current"),
         ([1.0, -0.1, 0.1], "no current may flow against its voltage"),
     ],
 )
 def test_currents_that_cannot_be_used(currents, message):
     with pytest.raises(CircuitError, match=message):
         fit_network(currents, DESIGN)
+
+
+def test_without_probes_nothing_is_determined():
+    fit = fit_network([], replace(DESIGN, probes=()))
+    assert np.isnan([fit.Ry, fit.Rc, fit.residual]).all()
+    assert fit.currents.shape == (0,)
+    assert fit.warnings == ("there are no probes: Ry and Rc are not determined",)
+
+
+def test_a_yarn_that_carries_nothing_but_rounding_does_not_conduct():
+    fit = fit_network([-3e-21, 0.0, 0.0], DESIGN)
+    assert (fit.Ry, fit.residual) == (np.inf, 0.0)
+    assert np.isnan(fit.Rc)
+    assert "the yarns do not conduct" in fit.warnings[0]
+
+
+def test_probes_across_insulated_yarns_tell_that_crossings_do_not_conduct():
+    fit = fit_network([1e-22, -3e-21], replace(DESIGN, probes=DESIGN.probes[1:]))
+    assert np.isnan(fit.Ry)
+    assert fit.Rc == np.inf
+    assert "Ry is not determined" in fit.warnings[0]
+
+
+def test_what_is_nothing_is_told_from_the_yarns_and_not_from_the_largest_current():
+    """A picoampere across yarns is a current if that is all there is, and rounding if it is 1e-17 A."""
+    design = replace(DESIGN, probes=DESIGN.probes[1:])
+    assert np.isfinite(fit_network([2e-12, 1e-12], design).Rc)
+    assert fit_network([2e-17, 1e-17], design).Rc == np.inf
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.sampled_from([-3e-21, 0.0, 1e-15, 1e-11, 1e-6, 1e-3, 0.8, 1.0, 50.0]), min_size=3, max_size=3))
+def test_no_currents_that_can_flow_stop_the_fit(currents):
+    fit = fit_network(currents, DESIGN)
+    assert fit.currents.shape == (3,)
+    assert np.isfinite([fit.Ry, fit.Rc]).all() or fit.warnings
 
 
 def test_unknown_weighting():

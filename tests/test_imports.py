@@ -20,7 +20,7 @@ SHARED = {"frozen", "errors", "compiled"}
 STATE = {"contact.state", "geometry.mesh"}
 RESULT_TYPES = {*STATE, "design", "fields", "fit", "verify", "mech.configuration"}
 ROUTES = {"fields", "circuit", "nodal", "netlist", "ngspice"}
-OUTPUTS = {"store", "summary", "report", "vtu"}
+OUTPUTS = {"store", "summary", "plot", "report", "vtu"}
 ALLOWED: dict[str, set[str]] = {
     "frozen": set(),
     "compiled": set(),

@@ -22,17 +22,15 @@ from circuittex.errors import CircuitError
 from circuittex.frozen import same
 from circuittex.netlist import (
     Header,
-    circuits_deck,
     deck,
-    drives_deck,
     parse,
     pin_names,
     subcircuit,
     to_pyspice,
 )
-from circuittex.ngspice import run_deck
+from circuittex.ngspice import run_deck, run_decks
 from circuittex.nodal import solve_nodal
-from circuittex.spice_names import unique_names
+from circuittex.spice_names import safe_name, unique_names
 
 # ngspice solves a few dozen well-scaled resistors once, without refinement.
 SIMULATED = 1e-12
@@ -102,30 +100,10 @@ Vy2p y2p 0 0.0
     assert deck(exact(two_fibrils()), {"y1m": 1.0, "y2p": 0.0}).splitlines() == expected.splitlines()
 
 
-def test_golden_sweep_of_drives():
-    chain = network([(0, 1, 1.0), (1, 2, 2.0)], [0, 1, 2])
-    text = drives_deck(chain, [{"p0": 1.0, "p2": 0.0}, {"p1": 3.0, "p2": 0.0}])
-    assert text.splitlines()[-9:] == [
-        "* sources",
-        "Vdrive_number drive_number 0 1.0",
-        "Vn0 n0 n0_source 0.0",
-        "Bn0 n0_source 0 V = pwl(v(drive_number), 1, 1.0, 2, 0.0, 3, 0.0)"
-        " + pwl(v(drive_number), 1, 0.0, 2, 1000000000000000.0, 3, 1000000000000000.0) * i(Vn0)",
-        "Vn1 n1 n1_source 0.0",
-        "Bn1 n1_source 0 V = pwl(v(drive_number), 1, 0.0, 2, 3.0, 3, 3.0)"
-        " + pwl(v(drive_number), 1, 1000000000000000.0, 2, 0.0, 3, 0.0) * i(Vn1)",
-        "Vn2 n2 0 0.0",
-        ".dc Vdrive_number 1.0 2.0 1.0",
-        ".end",
-    ]
-
-
 def test_a_detailed_circuit_comes_back_bit_for_bit():
     circuit = two_fibrils()
     assert same(parse(subcircuit(circuit, "pair")), circuit)
     assert same(parse(deck(circuit, {"y1m": 1.0})), circuit)
-    reduced = reduced_circuit((3, 2), 0.1, 1 / 3)
-    assert same(parse(drives_deck(reduced, [{"warp1_minus": 1.0}])), reduced)
 
 
 TEXT = st.text(max_size=30) | st.sampled_from(
@@ -198,6 +176,22 @@ def test_unsafe_names_stay_apart():
     )
 
 
+def test_long_names_that_differ_late_stay_different():
+    """All states of a design with a long title: the names of their sub-circuits are not cut to the same word."""
+    title = "a weave of many words " * 6
+    words = [safe_name(f"{title}{state}") for state in ("relaxed", "stretch-0.05", "stretch-0.1")]
+    assert len(set(words)) == 3
+    for word in words:
+        assert len(word) <= 80
+        assert word.startswith("a_weave_of_many_words_a_weave")
+        assert safe_name(word) == word
+    assert len(safe_name("9" * 100)) == 80
+    names = [line for state in ("relaxed", "reduced") for line in subcircuit(two_fibrils(), title + state).splitlines()]
+    heads, tails = ([line.split()[1] for line in names if line.startswith(key)] for key in (".subckt", ".ends"))
+    assert heads == tails
+    assert len(set(heads)) == 2
+
+
 def test_numbers_have_all_their_digits_and_no_suffix():
     ohm = [0.1 + 0.2, 1e6, 1 / 3, 1e-12, 123456789012345680.0]
     text = deck(network([(0, 1, r) for r in ohm], [0, 1]), {"p0": 1.0, "p1": 0.0})
@@ -268,15 +262,8 @@ def test_what_no_driven_port_reaches_is_left_out_of_a_deck():
 
 @pytest.mark.parametrize("volts", [np.nan, np.inf])
 def test_voltages_that_cannot_be_written(volts):
-    for write in (deck, lambda circuit, drive: drives_deck(circuit, [drive])):
-        with pytest.raises(CircuitError, match="not a finite voltage"):
-            write(two_fibrils(), {"y1m": volts})
-
-
-@pytest.mark.parametrize("drives", [[], [{}]])
-def test_a_sweep_needs_drives(drives):
-    with pytest.raises(CircuitError, match="at least one drive"):
-        drives_deck(two_fibrils(), drives)
+    with pytest.raises(CircuitError, match="not a finite voltage"):
+        deck(two_fibrils(), {"y1m": volts})
 
 
 def test_two_ports_on_one_node_have_no_netlist():
@@ -292,34 +279,16 @@ def test_ngspice_solves_two_touching_fibrils():
 
 
 @pytest.mark.parametrize("Rc", WOVEN_CURRENTS)
-def test_ngspice_answers_all_probes_of_a_woven_cell_in_one_sweep(Rc):
+def test_ngspice_answers_all_probes_of_a_woven_cell(Rc):
     circuit = reduced_circuit((4, 4), WOVEN_RY, Rc)
-    plot = run_deck(drives_deck(circuit, PAPER_DRIVES)).plots[-1]
-    for k, (drive, published) in enumerate(zip(PAPER_DRIVES, WOVEN_CURRENTS[Rc], strict=True)):
-        current = -plot.current(f"v{next(iter(drive))}")[k]
+    answers = run_decks([deck(circuit, drive) for drive in PAPER_DRIVES])
+    for data, drive, published in zip(answers, PAPER_DRIVES, WOVEN_CURRENTS[Rc], strict=True):
+        plot = data.plots[-1]
+        current = -plot.current(f"v{next(iter(drive))}")[0]
         assert current == pytest.approx(published, abs=WOVEN_ROUNDING)
         solution = solve_nodal(circuit, drive)
         assert current == pytest.approx(solution.port_current.max(), rel=SIMULATED)
-        np.testing.assert_allclose(plot.voltage(circuit.node_names)[k], solution.voltage, atol=SIMULATED)
-
-
-def test_ngspice_answers_drives_of_insulated_yarns_and_of_other_ports():
-    circuit = reduced_circuit((4, 4), 0.25, np.inf)
-    drives = [*PAPER_DRIVES, {"weft1_minus": 2.0, "weft1_plus": -1.0, "weft3_minus": 5.0}]
-    plot = run_deck(drives_deck(circuit, drives)).plots[-1]
-    expected = [{"warp2_minus": 1.0}, {}, {}, {"weft1_minus": 3.0}]
-    for k, currents in enumerate(expected):
-        for port in ("warp2_minus", "warp3_minus", "weft1_minus", "weft2_plus", "weft3_minus"):
-            assert -plot.current(f"v{port}")[k] == pytest.approx(currents.get(port, 0.0), abs=1e-13)
-
-
-def test_ngspice_solves_several_circuits_side_by_side():
-    cases = [(reduced_circuit((4, 4), WOVEN_RY, Rc), drive) for Rc in WOVEN_CURRENTS for drive in PAPER_DRIVES]
-    plot = run_deck(circuits_deck(cases)).plots[-1]
-    published = [current for currents in WOVEN_CURRENTS.values() for current in currents]
-    for k, ((_, drive), expected) in enumerate(zip(cases, published, strict=True), start=1):
-        current = -plot.current(f"vcase{k}_{next(iter(drive))}")[0]
-        assert current == pytest.approx(expected, abs=WOVEN_ROUNDING)
+        np.testing.assert_allclose(plot.voltage(circuit.node_names)[0], solution.voltage, atol=SIMULATED)
 
 
 def test_ngspice_takes_a_subcircuit_with_hostile_names():

@@ -13,9 +13,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from circuittex.circuit import reduced_circuit
 from circuittex.errors import NgspiceError
-from circuittex.netlist import drives_deck
 from circuittex.ngspice import estimated_seconds, feasible, find_ngspice, read_raw, run_deck, run_decks
 
 DIVIDER = "* divider\nv1 top 0 1\nr1 top mid 1\nr2 mid 0 3\n.op\n.end\n"
@@ -69,14 +67,6 @@ def test_several_decks_in_one_process_are_told_apart() -> None:
     decks = [DIVIDER.replace("v1 top 0 1", f"v1 top 0 {v}.0") for v in (1, 2, 3)]
     found = run_decks(decks)
     assert [data.plots[0].voltage(["mid"]).item() for data in found] == pytest.approx([0.75, 1.5, 2.25], rel=1e-15)
-
-
-def test_several_drives_of_one_deck() -> None:
-    circuit = reduced_circuit((1, 1), 2.0, 5.0)
-    left, right, _, up = circuit.ports
-    deck = drives_deck(circuit, [{left: 1.0, right: 0.0}, {left: 1.0, up: 0.0}])
-    (plot,) = run_deck(deck).plots
-    assert_allclose(plot.current("vwarp1_minus"), [-0.5, -1 / 7], rtol=1e-12)
 
 
 def test_settings_of_the_user_have_no_influence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,7 +22,9 @@ from hypothesis import strategies as st
 
 from circuittex.circuit import build_circuit, reduced_circuit
 from circuittex.errors import CircuitError
-from circuittex.nodal import port_basis, solve_drives, solve_nodal
+from circuittex.netlist import deck
+from circuittex.ngspice import run_deck
+from circuittex.nodal import port_basis, rounding_errors, solve_drives, solve_nodal
 
 EXACT = 1e-12  # relative: what the solution promises
 
@@ -199,11 +201,48 @@ def test_drives_of_the_same_ports_share_a_solution_and_superpose():
     np.testing.assert_array_equal(other.voltage, alone.voltage)
 
 
-def test_admittance_of_a_three_terminal_star():
+def test_currents_of_a_three_terminal_star():
     star = network([(0, 3, 1.0), (1, 3, 2.0), (2, 3, 4.0)], [0, 1, 2])
-    g = np.array([1.0, 0.5, 0.25])
-    expected = np.diag(g) - np.outer(g, g) / g.sum()  # star-mesh transform
-    np.testing.assert_allclose(port_basis(star, ["p0", "p1", "p2"]).admittance, expected, rtol=EXACT)
+    g, volts = np.array([1.0, 0.5, 0.25]), np.array([3.0, -1.0, 0.5])
+    expected = (np.diag(g) - np.outer(g, g) / g.sum()) @ volts  # star-mesh transform
+    solution = solve_nodal(star, {"p0": 3.0, "p1": -1.0, "p2": 0.5})
+    np.testing.assert_allclose(solution.port_current, expected, rtol=EXACT)
+
+
+@pytest.mark.parametrize("ohm", [1e3, 1e9, 1e13])
+def test_two_yarns_on_poor_contacts_keep_their_digits(ohm):
+    """A ladder whose rungs conduct up to sixteen decades less than its rails, against its continued fraction."""
+    n = 200
+    rails = [(2 * k + side, 2 * k + 2 + side, 1e-3) for k in range(n - 1) for side in (0, 1)]
+    rungs = [(2 * k, 2 * k + 1, ohm) for k in range(n)]
+    circuit = network(rails + rungs, [0, 1])
+    current = solve_nodal(circuit, {"p0": 1.0, "p1": 0.0}).port_current
+    r, g = 2e-3, 1.0 / ohm  # both rails of a cell in series; from the far end, one rung after the other
+    seen = g
+    for _ in range(n - 1):
+        seen = g + 1.0 / (r + 1.0 / seen)
+    np.testing.assert_allclose(current, [seen, -seen], rtol=1e-12)
+
+
+def test_currents_that_break_kirchhoffs_law_are_refused():
+    """A solution that has lost its digits is an error, not a number."""
+    basis = port_basis(network([(0, 2, 1.0), (2, 1, 2.0)], [0, 1]), ["p0", "p1"])
+    assert basis.solve({"p0": 1.0, "p1": 0.0}).port_current[0] == pytest.approx(1 / 3, rel=EXACT)
+    wrong = replace(basis, flow=basis.flow * [1.0, 1.0 + 1e-7])
+    with pytest.raises(CircuitError, match=r"port currents add up to .* between 1.0e\+00 and 2.0e\+00 ohm"):
+        wrong.solve({"p0": 1.0, "p1": 0.0})
+
+
+def test_rounding_errors_bound_what_ngspice_errs_by():
+    """A ladder on poor contacts, against its closed form: within the estimate and not a thousandth of it."""
+    n, ohm = 30, 1e7
+    rails = [(2 * k + side, 2 * k + 2 + side, 1e-3 / 3.0) for k in range(n - 1) for side in (0, 1)]
+    circuit = network(rails + [(2 * k, 2 * k + 1, ohm) for k in range(n)], [0, 1])
+    drive = {"p0": 1.0, "p1": 0.0}
+    exact = solve_nodal(circuit, drive)
+    _, current = rounding_errors(circuit, drive)
+    found = -run_deck(deck(circuit, drive)).plots[0].current("vn0")[0]
+    assert 1e-4 * current[0] < abs(found - exact.port_current[0]) < current[0]
 
 
 def test_a_circuit_of_driven_nodes_only():

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from synthetic_study import synthetic_study
-from test_summary import unchecked
+from test_summary import disagreeing, unchecked
 
 from circuittex.plot import FIGURES
 from circuittex.report import page, write_report
@@ -86,6 +86,14 @@ def test_agreement_and_its_lack_are_said_plainly() -> None:
     assert 'class="bad"' in missing
     assert "ngspice did NOT check relaxed" in missing
     assert "NOT CHECKED ngspice was not found" in missing
+
+
+def test_the_verdict_names_the_states_that_disagree() -> None:
+    text = page(disagreeing(STUDY, "stretch-0.0250", reduced_difference=3e-8), {})
+    assert "The routes DISAGREE in stretch-0.0250, by up to 3.0e-08" in text
+    assert "ngspice confirmed" not in text
+    assert text.count("NOT CONFIRMED") == 1
+    assert 'class="bad"' in text
 
 
 @pytest.mark.parametrize("difference", [2e-9, float("nan")])

@@ -99,3 +99,47 @@ def test_missing_ngspice_is_said_plainly() -> None:
     every = table(unchecked(STUDY, *(record.name for record in STUDY.records)))
     assert "ngspice did NOT check any state" in every
     assert "confirmed" not in every
+
+
+def disagreeing(study: Study, name: str, **values: float) -> Study:
+    """The study with other differences between the routes in one state; ngspice has answered all the same."""
+    own = {"reduced_difference": values.pop("reduced_difference")} if "reduced_difference" in values else {}
+    return replace(
+        study,
+        records=tuple(
+            replace(r, verification=replace(r.verification, **values), **own) if r.name == name else r
+            for r in study.records
+        ),
+    )
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"max_voltage_difference": 3e-8},
+        {"max_current_difference": 3e-8},
+        {"native_difference": 3e-8, "max_current_difference": 3e-8, "ngspice_limit": 1e-6},
+        {"reduced_difference": 3e-8},
+    ],
+)
+def test_routes_that_disagree_are_not_called_confirmed(values: dict[str, float], tmp_path: Path) -> None:
+    study = disagreeing(STUDY, "stretch-0.0250", **values)
+    text = table(study)
+    assert "The routes DISAGREE in stretch-0.0250, by up to 3.0e-08: do not trust the results." in text
+    assert "confirmed" not in text
+    states = written(study, tmp_path)["states"]
+    assert [state["verification"]["confirmed"] for state in states] == [True, False, True]
+
+
+def test_a_difference_that_ngspices_rounding_explains_is_none(tmp_path: Path) -> None:
+    study = disagreeing(STUDY, "relaxed", max_current_difference=3e-8, ngspice_limit=2e-7)
+    assert table(study).splitlines()[-2:] == [
+        "ngspice confirmed every recorded state.",
+        "ngspice's own rounding limits this check to 2.0e-07.",
+    ]
+    assert written(study, tmp_path)["states"][0]["verification"]["confirmed"]
+
+
+def test_a_reduced_network_that_ngspice_did_not_check_is_named() -> None:
+    study = disagreeing(STUDY, "relaxed", reduced_difference=math.nan)
+    assert table(study).splitlines()[-1] == "ngspice did NOT check the reduced network of relaxed."

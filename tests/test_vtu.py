@@ -94,14 +94,26 @@ def test_file_holds_tubes_and_values(tmp_path: Path) -> None:
     assert tube.points.shape == (8 * mesh.n_nodes, 3)
     assert tube.cells_dict["quad"].shape == (8 * (mesh.n_nodes - mesh.n_fibrils), 4)
     cells = {name: values[0] for name, values in tube.cell_data.items()}
-    assert set(cells) == {"fibril", "yarn", "section_force_N", "contact_line_load_N_per_mm"} | {
-        f"current_A {fields.probe}" for fields in record.fields
+    assert set(cells) == {
+        *("fibril", "yarn", "section_force_N", "nominal_stress_MPa", "contact_line_load_N_per_mm"),
+        *(f"current_A {fields.probe}" for fields in record.fields),
     }
     assert np.array_equal(np.unique(cells["fibril"]), np.arange(mesh.n_fibrils))
     assert set(np.unique(cells["section_force_N"])) == set(np.unique(record.section_force))
     hottest = max(float(tube.point_data[f"temperature_K {fields.probe}"].max()) for fields in record.fields)
     assert 0.9 * record.peak_temperature < hottest <= record.peak_temperature
     assert np.isnan(tube.point_data[f"potential_V {record.fields[0].probe}"]).sum() == 8 * 41  # one unreached fibril
+
+
+def test_stress_is_the_section_force_over_the_undeformed_area(tmp_path: Path) -> None:
+    """Fibrils of radius 0.15 mm that carry 0.1 N and, on one element, 0.2 N: 1.4147 and 2.8294 N/mm2."""
+    force = np.full(len(STUDY.mesh.elements), 0.1)
+    force[7] = 0.2
+    write_vtu(tmp_path / "state.vtu", STUDY.mesh, replace(STUDY.records[1], section_force=force))
+    stress = read(tmp_path / "state.vtu").cell_data["nominal_stress_MPa"][0]
+    values, counts = np.unique(stress, return_counts=True)
+    np.testing.assert_allclose(values, [1.41471, 2.82942], rtol=1e-5)
+    assert counts[1] == 12 * STUDY.mesh.order
 
 
 def test_quadrilaterals_face_outwards(tmp_path: Path) -> None:

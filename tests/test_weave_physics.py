@@ -203,7 +203,6 @@ def test_two_touching_fibrils_of_different_conductivity(sigma: tuple[float, floa
     assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx([2.0, 2.0], abs=0.1)
 
 
-@pytest.mark.xfail(strict=True, reason="build_circuit keeps segments of 1e-16 mm between feet that differ by rounding")
 def test_feet_that_differ_by_rounding_share_a_node() -> None:
     """Both sides of a contact between parallel fibrils have their feet at the same two places."""
     contacts, exact = rails((10.0, 2.0), 16)

@@ -45,7 +45,7 @@ def curve_table(mesh: FibrilMesh) -> CurveTable:
     """The table for a mesh; every fibril needs at least four nodes."""
     nodes = np.diff(mesh.first_node)
     if nodes.min() < 4:
-        raise DesignError("numerics.elements", int(mesh.elements.shape[0]), "contact needs four nodes on every fibril")
+        raise DesignError("nodes of a fibril", int(nodes.min()), "contact needs four nodes on every fibril")
     first = np.concatenate([[0], np.cumsum(nodes - 1)])
     fibril = np.repeat(np.arange(mesh.n_fibrils), nodes - 1)
     k = np.arange(first[-1]) - first[fibril]

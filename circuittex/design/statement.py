@@ -58,9 +58,11 @@ class Numerics:
     max_iterations: int = 200
     """Newton iterations before a relaxation is given up."""
     merge_length: float = 1.0
-    """Contacts of a fibril pair within bins of this length become one resistor in the netlists, mm; 0 keeps all."""
+    """Contacts of a fibril pair within bins of this length become one resistor in the netlists, mm; 0 keeps all. At
+    most the length of the longest fibril."""
     snap_length: float = 1e-3
-    """Feet closer than this on a fibril share a node in the netlists, mm; 0 keeps all."""
+    """Feet closer than this on a fibril share a node in the netlists, mm; 0 keeps all. At most a tenth of the
+    shortest element: feet that lie as far apart as contact points must stay apart."""
     drop_fraction: float = 1e-6
     """Contacts below this fraction of the largest conductance are left out of the netlists."""
 
@@ -100,6 +102,7 @@ class Design:
         distinct(tuple(terminal.name for terminal in self.terminals), "terminals")
         distinct(tuple(probe.name for probe in self.probes), "probes.name")
         self._check_size()
+        self._check_lengths()
         self._check_terminals()
         self._check_probes()
 
@@ -115,6 +118,22 @@ class Design:
             least = -(-2 * crossings // order)
             allowed = f"it must be at least {least}: two nodes for each of {crossings} crossings, at order {order}"
             raise refuse("numerics.elements", elements, allowed)
+
+        if elements * order < 3:
+            least = -(-3 // order)
+            allowed = f"it must be at least {least}: contact needs four nodes on every fibril, at order {order}"
+            raise refuse("numerics.elements", elements, allowed)
+
+    def _check_lengths(self) -> None:
+        weave, numerics = self.weave, self.numerics
+        lengths = len(weave.warp) * weave.pitch, len(weave.weft) * weave.pitch
+        element, fibril = min(lengths) / numerics.elements, max(lengths)
+        if numerics.snap_length > element / 10:
+            allowed = f"it must be at most {element / 10:.4g} mm, a tenth of the shortest element"
+            raise refuse("numerics.snap_length", numerics.snap_length, allowed)
+        if numerics.merge_length > fibril:
+            allowed = f"it must be at most {fibril:.4g} mm, the length of the longest fibril"
+            raise refuse("numerics.merge_length", numerics.merge_length, allowed)
 
     def _check_terminals(self) -> None:
         known = self.weave.yarn_names

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from circuittex.plot.style import COLOURS, GREY, LINES, MARKERS, new_figure, style
 from circuittex.results import Record, Study
 from circuittex.summary import insulated_resistance
+from circuittex.verify import AGREEMENT
 
 
 def loading_paths(study: Study) -> dict[str, tuple[Record, ...]]:
@@ -62,6 +63,9 @@ def network_figure(study: Study) -> Figure:
         left.set_title("yarn segment")
         left.set_ylabel("Ry (Ω)")
         _plot_paths(right, study, lambda r: r.fit.Rc, 1, "")
+        for axes, ohms in ((left, [r.fit.Ry for r in study.records]), (right, [r.fit.Rc for r in study.records])):
+            if not np.isfinite(ohms).any():
+                axes.text(0.5, 0.5, "infinite or not determined", ha="center", va="center", transform=axes.transAxes)
         right.set_title("crossing")
         right.set_ylabel("Rc (Ω)")
         _finish(figure, study)
@@ -84,7 +88,8 @@ def verification_figure(study: Study) -> Figure:
             # Equal to the last bit is drawn at the rounding unit: a logarithm has no zero.
             size = np.maximum([abs(value(record)) for record in study.records], np.finfo(float).eps)
             axes.plot(size, places, MARKERS[number], color=COLOURS[number], label=label, markersize=5)
-        axes.axvline(1e-9, color=GREY, linestyle="--", linewidth=1.0, label="required of the routes, 1e-9")
+        required = f"required of the routes, {AGREEMENT:.0e}"
+        axes.axvline(AGREEMENT, color=GREY, linestyle="--", linewidth=1.0, label=required)
         axes.set_xscale("log")
         axes.set_yticks(places, [record.name for record in study.records])
         axes.set_ylim(len(places) - 0.5, -0.5)

@@ -14,10 +14,8 @@ import numpy as np
 from circuittex.plot import save_figures
 from circuittex.report.frame import PAGE
 from circuittex.results import Record, Study
-from circuittex.summary import difference, insulated_resistance, ngspice_statement
-
-REQUIRED = 1e-9
-"""Largest difference between two routes that counts as agreement."""
+from circuittex.summary import agrees, confirmed, difference, insulated_resistance, ngspice_statement
+from circuittex.verify import AGREEMENT
 
 _CAPTIONS = {
     "cell": "The relaxed cell. Colour: magnitude of the force a fibril's section carries.",
@@ -108,15 +106,16 @@ def _verdict(study: Study) -> str:
     """Whether the routes agree and ngspice took part, as a box that cannot be overlooked."""
     if not study.records:
         return '<p class="bad">No state has been recorded: there are no results yet.</p>'
-    worst = float(np.max([difference(record) for record in study.records]))  # nan if any is: that is no agreement
-    agree = worst <= REQUIRED
-    checked = all(record.verification.ngspice_checked for record in study.records)
-    sentences = [
-        f"The routes to every node voltage and probe current {'agree' if agree else 'DISAGREE'}: the largest "
-        f"difference in any state is {worst:.1e} (at most {REQUIRED:.0e} is required).",
-        *ngspice_statement(study),
-    ]
-    kind = "good" if agree and checked else "bad"
+    sentences = list(ngspice_statement(study))
+    if study.design.probes:
+        worst = float(np.max([difference(record) for record in study.records]))  # nan if any is
+        agree = all(agrees(record) for record in study.records)
+        sentences.insert(
+            0,
+            f"The routes to every node voltage and probe current {'agree' if agree else 'DISAGREE'}: the largest "
+            f"difference in any state is {worst:.1e} (at most {AGREEMENT:.0e} is required).",
+        )
+    kind = "good" if all(confirmed(record) for record in study.records) else "bad"
     return f'<div class="{kind}">' + "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences) + "</div>"
 
 
@@ -179,14 +178,21 @@ def _verification_row(record: Record) -> list[str]:
     return [
         record.name,
         ", ".join(check.routes),
-        f"{check.max_voltage_difference:.1e}",
-        f"{check.max_current_difference:.1e}",
+        _number(check.max_voltage_difference, 2),
+        _number(check.max_current_difference, 2),
         _number(record.reduced_difference, 2),
         _number(check.merge_error, 2),
         _number(check.field_difference, 2),
-        "checked" if check.ngspice_checked else f"NOT CHECKED {check.note}".strip(),
-        f"{check.fields_seconds + check.nodal_seconds + check.ngspice_seconds:.2g}",
+        _ngspice_word(record),
+        f"{np.nansum([check.fields_seconds, check.nodal_seconds, check.ngspice_seconds]):.2g}",
     ]
+
+
+def _ngspice_word(record: Record) -> str:
+    check = record.verification
+    if confirmed(record):
+        return f"confirmed {check.note}".strip()
+    return f"{'NOT CONFIRMED' if check.ngspice_checked else 'NOT CHECKED'} {check.note}".strip()
 
 
 def _parameters(study: Study) -> str:

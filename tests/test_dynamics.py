@@ -203,7 +203,7 @@ def test_too_little_time_is_an_error_with_history(cell: tuple[Design, FibrilMesh
 
 
 def test_an_unsolved_step_is_an_error(cell: tuple[Design, FibrilMesh]) -> None:
-    with pytest.raises(ConvergenceError, match="no equilibrium in 1 iterations"):
+    with pytest.raises(ConvergenceError, match="no equilibrium after 1 iterations"):
         settle(cell, max_iterations=1)
 
 

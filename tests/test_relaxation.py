@@ -9,10 +9,11 @@ import pytest
 from fabrics import mirrored, renumbered, small_cell
 
 from circuittex.contact.extract import contact_state
-from circuittex.design import Design
+from circuittex.design import Design, plain_weave
 from circuittex.errors import ConvergenceError
 from circuittex.frozen import same
 from circuittex.geometry.mesh import FibrilMesh
+from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.mech.linear import SuperLUSolver
 from circuittex.relaxation import Equilibrium, clamp_force, force_terms, move, relax
@@ -147,7 +148,7 @@ def test_stiffness_and_penalty_in_proportion_scale_forces_only(cell: Cell) -> No
 @pytest.mark.parametrize("limit", [1, 3])
 def test_an_unconverged_state_is_never_returned(limit: int) -> None:
     design, mesh = small_cell((1, 2), elements=6, max_iterations=limit)
-    with pytest.raises(ConvergenceError, match=f"no equilibrium in {limit} iterations") as caught:
+    with pytest.raises(ConvergenceError, match=f"no equilibrium after {limit} iterations") as caught:
         solved(design, mesh)
     assert caught.value.history.shape == (limit + 1, 4)
     assert np.all(caught.value.history[:, 0] > design.numerics.tolerance)
@@ -223,3 +224,22 @@ def test_clamp_force_sums_the_plus_ends_of_either_direction(cell: Cell) -> None:
     force[mesh.end_nodes(+1), mesh.yarn_axis[mesh.yarn]] = 0.5
     force[mesh.end_nodes(-1)] = 100.0
     assert np.array_equal(clamp_force(mesh, force), [[3.0, 0, 0], [0, 3.0, 0]])
+
+
+@pytest.mark.parametrize(("modulus", "density"), [(2000.0, 1.2e-3), (1.2e5, 8.9e-3)])
+def test_stiff_and_light_materials_relax_to_the_same_shape(modulus: float, density: float) -> None:
+    """With penalty and modulus scaled alike, nylon's and copper's equilibrium is the soft cell's."""
+    soft = plain_weave(yarns=2, rows=(1, 2))
+    soft = replace(soft, numerics=replace(soft.numerics, elements=10))
+    yarn = soft.weave.warp[0]
+    material = replace(yarn.materials[0], youngs_modulus=modulus, density=density)
+    stiff_yarn = replace(yarn, materials=(material,) * len(yarn.materials))
+    ratio = modulus / yarn.materials[0].youngs_modulus
+    stiff = replace(
+        soft,
+        weave=replace(soft.weave, warp=(stiff_yarn,) * 2, weft=(stiff_yarn,) * 2),
+        contact=replace(soft.contact, penalty=ratio * soft.contact.penalty),
+        numerics=replace(soft.numerics, tolerance=ratio * soft.numerics.tolerance),
+    )
+    energies = [relax(build_mesh(design), design).energy for design in (soft, stiff)]
+    assert energies[1] / energies[0] == pytest.approx(ratio, rel=1e-6)  # residuals of 1e-6 of the forces

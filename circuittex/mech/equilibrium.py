@@ -22,9 +22,9 @@ from circuittex.mech.linear import LinearSolver, Solve
 from circuittex.mech.pattern import Pattern, build_pattern, diagonal, multiply
 from circuittex.mech.terms import ForceTerm
 
-FIRST_SHIFT, LEAST_SHIFT, LARGEST_SHIFT = 1e-2, 1e-5, 1e6
-"""Shifts, N/mm per g times `_System.scale`. The least keeps the fibrils' free spin about their axes, a true zero
-mode, solvable; it is a thousand times softer than the softest bending mode of the paper's fibrils."""
+FIRST_SHIFT, LEAST_SHIFT = 1e-2, 1e-5
+"""Shifts, N/mm per g. The least keeps the fibrils' free spin about their axes, a true zero mode, solvable; it is a
+thousand times softer than the softest bending mode of the paper's fibrils."""
 SOFTENING = (1.0, 0.7, 0.3)
 """Parts of the softening tangent that are tried far from equilibrium, where a descent through sliding contacts
 takes fewer iterations with less of it than with a larger shift alone. The search begins one place before the part
@@ -35,9 +35,8 @@ the symmetry of a weave leads there, and Newton's method leaves it slowly."""
 ROUGH = 0.02
 """Far from equilibrium the largest free force exceeds this part of the largest force of all. Nearer, only the whole
 tangent will do: with less of it the convergence is linear, and may end at a saddle."""
-STIFF = 2000.0
-"""Largest stiffness over mass of an unknown, N/mm per g, up to which the shifts hold as they are (the paper's cell has
-about that); they grow in proportion beyond, since what is small beside the tangent is lost in round-off."""
+LARGEST_SHIFT = 1e3
+"""Largest shift tried, in parts of the largest stiffness over mass of an unknown: it leaves nothing of the tangent."""
 INVERSE_ITERATIONS = 12
 """Enough for the lowest mode to lead: its curvature and the shift nearly cancel."""
 FIRST_ESCAPE = 1e-4
@@ -79,7 +78,7 @@ class _System:
     mass: Floats = field(default_factory=lambda: np.empty(0))
     data: Floats = field(default_factory=lambda: np.empty(0))
     softening: Floats = field(default_factory=lambda: np.empty(0))
-    scale: float = 1.0
+    largest_shift: float = 0.0
     held: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     def assemble(self, q: Floats) -> tuple[Pattern, float, Floats]:
@@ -100,7 +99,7 @@ class _System:
 
     def factor(self, solver: LinearSolver, shift: float, softening: float) -> Solve | None:
         assert self.pattern is not None
-        values = self.data + softening * self.softening + shift * self.scale * self.mass
+        values = self.data + softening * self.softening + shift * self.mass
         values[self.held] = 0.0
         values[diagonal(self.pattern)[self.fixed]] = 1.0
         return solver.factor(self.pattern, values)
@@ -136,7 +135,7 @@ def minimise(
         pattern, energy, gradient = system.assemble(q)
         if iteration == 0:
             stiffness, inertia = (values[diagonal(pattern)][free] for values in (system.data, system.mass))
-            system.scale = max(1.0, float((stiffness / inertia).max()) / STIFF)
+            system.largest_shift = LARGEST_SHIFT * float((stiffness / inertia).max())
         residual = float(np.abs(gradient[free]).max())
         history.append((residual, energy, shift, step))
         if report is not None:
@@ -159,7 +158,7 @@ def minimise(
         step = _search(system, q, direction, energy, float(force @ direction))
         if step == 0.0:
             shift = 16 * max(shift, FIRST_SHIFT)
-            if shift > LARGEST_SHIFT:
+            if shift > system.largest_shift:
                 break
             continue
         q = q + step * direction
@@ -180,7 +179,7 @@ def _positive(
     Returns the shift, the place in `SOFTENING` of the part that served, and the factor. Of `parts`, the first
     that serves is taken.
     """
-    while shift <= LARGEST_SHIFT:
+    while shift <= system.largest_shift:
         for part in parts:
             solve = system.factor(solver, shift, part)
             if solve is not None:

@@ -6,7 +6,6 @@ import json
 import re
 import subprocess
 import sys
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -214,28 +213,6 @@ def test_long_pin_lists_are_continued():
         pins += lines[first].split()[1:]
     assert len(pins) == 36
     assert max(map(len, lines)) <= 100
-
-
-def test_a_hundred_thousand_resistors_in_half_a_second():
-    n = 100_000
-    chain = network([(0, 1, 1.0)], [0, 1])
-    circuit = replace(
-        chain,
-        node_names=tuple(f"warp1_f01_{k}um" for k in range(n // 2)),
-        node_fibril=np.arange(n // 2) // 600,
-        node_xi=np.linspace(0, 8, n // 2),
-        resistor_nodes=np.random.default_rng(0).integers(0, n // 2, (n, 2)),
-        resistance=np.linspace(0.1, 1.0, n),
-        resistor_names=tuple(f"c_warp1_f01_weft1_f01_{k}um" for k in range(n)),
-        resistor_kind=np.ones(n, dtype=np.int64),
-    )
-    seconds = []
-    for _ in range(3):
-        start = time.process_time()
-        text = subcircuit(circuit, "large")
-        seconds.append(time.process_time() - start)
-    assert text.count("\nR") == n
-    assert min(seconds) < 0.5
 
 
 @pytest.mark.parametrize(

@@ -146,8 +146,9 @@ def minimise(
             return Minimum(q, gradient, energy, residual, iteration, np.array(history))
         if iteration == max_iterations:
             break
-        parts = SOFTENING if residual > ROUGH * np.abs(gradient).max() else SOFTENING[:1]
-        shift, part, solve = _positive(system, solver, shift, parts[max(0, part - 1) :], history)
+        rough = residual > ROUGH * np.abs(gradient).max()
+        parts = SOFTENING[max(0, part - 1) :] if rough else SOFTENING[:1]
+        shift, part, solve = _positive(system, solver, shift, parts, history)
         if shift > FIRST_SHIFT and residual < SADDLE * np.abs(gradient).max():
             lower = _escape(system, pattern, solve, q, energy, free)
             if lower is not None:

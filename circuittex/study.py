@@ -18,10 +18,11 @@ from circuittex.fit import fit_network
 from circuittex.geometry.levels import levels
 from circuittex.geometry.mesh import Floats
 from circuittex.geometry.weave import build_mesh
+from circuittex.increment import advance
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.linear import LinearSolver, best_solver
 from circuittex.plot import FIGURES
-from circuittex.relaxation import Equilibrium, clamp_force, move, relax
+from circuittex.relaxation import Equilibrium, clamp_force, relax
 from circuittex.report import write_report
 from circuittex.results import Record, Study
 from circuittex.store import append_record, write_study_start
@@ -144,8 +145,8 @@ def _states(
         now, before = relaxed, rest
         for name, strain, target in zip(names, loading.strains, loading.gradients, strict=True):
             after = np.array(target)
-            start = move(now.configuration, before, after)
-            now, before = relax(mesh, design, start, solver=solver, report=report(name)), after
+            now = advance(mesh, design, now.configuration, before, after, solver=solver, report=report(name))
+            before = after
             yield name, loading.name, strain, after, now
 
 

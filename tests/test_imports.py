@@ -32,6 +32,7 @@ ALLOWED: dict[str, set[str]] = {
     "mech": {"geometry", "design"},
     "contact": {"mech.configuration", "mech.terms", "mech.pattern", "mech.space", "geometry", "design"},
     "relaxation": {"design", "geometry", "mech", "contact"},
+    "increment": {"design", "geometry", "mech", "relaxation"},
     "fields": {*STATE, "design"},
     "spice_names": set(),
     "feet": {*STATE, "spice_names"},
@@ -53,8 +54,8 @@ ALLOWED: dict[str, set[str]] = {
     "plot": {*RESULT_TYPES, "results", "tubes", "summary"},
     "report": {*RESULT_TYPES, "results", "summary", "plot"},
     "study": {
-        *{"design", "geometry", "mech", "contact", "relaxation", "fields", "fit", "verify", "verify_reduced", "export"},
-        *{"results", *OUTPUTS},
+        *{"design", "geometry", "mech", "contact", "relaxation", "increment", "fields", "fit", "verify"},
+        *{"verify_reduced", "export", "results", *OUTPUTS},
     },
 }
 ANYTHING = {"cli", "__main__"}  # the command line, which nobody imports

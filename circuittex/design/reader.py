@@ -20,6 +20,7 @@ from circuittex.design.experiment import (
     uniaxial,
 )
 from circuittex.design.fabric import ContactLaw, Material, Weave, Yarn, check_draft, check_rows
+from circuittex.design.packing import Packing
 from circuittex.design.statement import FORMAT, Design, Electrical, Numerics
 from circuittex.design.table import Table, quantity
 
@@ -38,6 +39,7 @@ _MATERIAL_UNITS = {
 }
 _CONTACT_UNITS = {"penalty": "N/mm2", "conductivity": "S/mm2", "heat_transfer": "W/(mm2 K)"}
 _NUMERICS_UNITS = {"tolerance": "N", "merge_length": "mm", "snap_length": "mm", "drop_fraction": "1"}
+_PACKING_UNITS = {"lateral": "mm", "vertical": "mm", "twist": "1/mm", "phase": "mm"}
 _LOADING_KEYS = {
     "uniaxial": ("strain", "steps", "strains", "axis"),
     "biaxial": ("strain", "steps", "strains"),
@@ -63,6 +65,7 @@ def read_design(mapping: object) -> Design:
             "probes",
             "electrical",
             "numerics",
+            "packing",
         ),
     )
     version = top.get("format", f"format = {FORMAT} states the layout of the file")
@@ -80,6 +83,7 @@ def read_design(mapping: object) -> Design:
         probes=tuple(_probe(value, path) for value, path in _entries(top, "probes")),
         electrical=_electrical(top.value.get("electrical", {})),
         numerics=_numerics(top.value.get("numerics", {})),
+        packing=_packing(top.value.get("packing", {})),
     )
 
 
@@ -250,6 +254,12 @@ def _numerics(value: object) -> Numerics:
     table = Table(value, "numerics", known)
     numbers = {key: table.number(key, unit) for key, unit in _NUMERICS_UNITS.items() if table.has(key)}
     return Numerics(**{**table.value, **numbers})
+
+
+def _packing(value: object) -> Packing:
+    table = Table(value, "packing", ("seed", *_PACKING_UNITS))
+    numbers = {key: table.number(key, unit) for key, unit in _PACKING_UNITS.items() if table.has(key)}
+    return Packing(**{**table.value, **numbers})
 
 
 def _choice(value: object, path: str, known: Mapping[str, _T]) -> _T:

@@ -9,6 +9,7 @@ from dataclasses import fields, is_dataclass
 from circuittex.design.checks import distinct, one_of, real, refuse, store, title, truth, whole
 from circuittex.design.experiment import Loading, Probe, Terminal
 from circuittex.design.fabric import ContactLaw, Weave
+from circuittex.design.packing import Packing
 from circuittex.frozen import frozen
 
 FORMAT = 1
@@ -95,6 +96,7 @@ class Design:
     probes: tuple[Probe, ...] = ()
     electrical: Electrical = Electrical()
     numerics: Numerics = Numerics()
+    packing: Packing = Packing()
 
     def __post_init__(self) -> None:
         title(self.name, "name")
@@ -103,6 +105,7 @@ class Design:
         distinct(tuple(probe.name for probe in self.probes), "probes.name")
         self._check_size()
         self._check_lengths()
+        self._check_packing()
         self._check_terminals()
         self._check_probes()
 
@@ -134,6 +137,20 @@ class Design:
         if numerics.merge_length > fibril:
             allowed = f"it must be at most {fibril:.4g} mm, the length of the longest fibril"
             raise refuse("numerics.merge_length", numerics.merge_length, allowed)
+
+    def _check_packing(self) -> None:
+        # Beyond these no random packing keeps its fibrils apart, and a twist could not be followed by the mesh.
+        radius = min(yarn.radius for yarn in self.weave.yarns)
+        pitch = self.weave.pitch
+        largest = {
+            "lateral": (radius, "mm, the smallest radius"),
+            "vertical": (radius, "mm, the smallest radius"),
+            "twist": (0.25 / pitch, "turns/mm, a quarter of a turn a pitch"),
+            "phase": (pitch / 4.0, "mm, a quarter of the pitch"),
+        }
+        for key, (most, meaning) in largest.items():
+            if getattr(self.packing, key) > most:
+                raise refuse(f"packing.{key}", getattr(self.packing, key), f"it must be at most {most:.4g} {meaning}")
 
     def _check_terminals(self) -> None:
         known = self.weave.yarn_names

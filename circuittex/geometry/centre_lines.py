@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from circuittex.design import Weave, Yarn
+from circuittex.design import Weave
+from circuittex.design.packing import Packing
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import Floats, Ints
+from circuittex.geometry.packing import centred, draw, places_in_yarn
 
 
 @frozen
@@ -26,12 +28,13 @@ class CentreLines:
     """(F, K, 2, 3) unit directors g1, g2."""
 
 
-def centre_lines(weave: Weave, n_places: int) -> CentreLines:
+def centre_lines(weave: Weave, n_places: int, packing: Packing = Packing()) -> CentreLines:  # noqa: B008 (frozen)
     """Centre lines and directors at `n_places` equally spaced places on every fibril.
 
     r(xi3) = yarn axis(s) + lateral offset + row offset with s = xi3 - L/2. The row offset is vertical, as in
     the paper's start, so rows come closer than their spacing where the yarn rises. The natural length L is
     that of the straight yarn, crossings x pitch; the clamped wave is longer, so fibrils start in tension.
+    `packing` shifts the waves of the yarns and moves the fibrils within them, see `places_in_yarn`.
 
     >>> from circuittex.design import plain_weave
     >>> centre_lines(plain_weave().weave, 5).position.shape
@@ -41,29 +44,18 @@ def centre_lines(weave: Weave, n_places: int) -> CentreLines:
     yarn = np.repeat(np.arange(len(weave.yarns)), fibrils)
     along_x = yarn < len(weave.warp)
     length = np.where(along_x, len(weave.weft), len(weave.warp)) * weave.pitch
-    xi = length[:, None] * np.linspace(0.0, 1.0, n_places)
+    t = np.linspace(0.0, 1.0, n_places)
+    xi = length[:, None] * t
     s = xi - length[:, None] / 2.0
-    offsets = np.concatenate([section_offsets(kind) for kind in weave.yarns])
-    places = weave.pitch * np.concatenate([_centred(len(weave.warp)), _centred(len(weave.weft))])
-    across = np.broadcast_to((places[yarn] + offsets[:, 0])[:, None], s.shape)
-    height, slope = _axis_heights(weave, yarn, s)
+    draws = draw(weave, packing.seed)
+    offset, offset_slope = places_in_yarn(weave, packing, draws, t)
+    axes = weave.pitch * np.concatenate([centred(len(weave.warp)), centred(len(weave.weft))])
+    across = axes[yarn][:, None] + offset[..., 0]
+    height, slope = _axis_heights(weave, yarn, s - packing.phase * draws.phase[yarn][:, None])
     warp = along_x[:, None]
-    position = np.stack([np.where(warp, s, across), np.where(warp, across, s), height + offsets[:, 1:]], axis=-1)
-    return CentreLines(yarn, length, xi, position, _directors(slope, warp))
-
-
-def section_offsets(yarn: Yarn) -> Floats:
-    """(n, 2) lateral and vertical place of each fibril in the section of its yarn, mm, row by row from below.
-
-    >>> from circuittex.design import plain_weave
-    >>> section_offsets(plain_weave(rows=(1, 2)).weave.warp[0])
-    array([[ 0.  , -0.15],
-           [-0.15,  0.15],
-           [ 0.15,  0.15]])
-    """
-    heights = _centred(len(yarn.rows)) * yarn.row_spacing
-    lateral = np.concatenate([_centred(n) * yarn.spacing for n in yarn.rows])
-    return np.column_stack([lateral, np.repeat(heights, yarn.rows)])
+    position = np.stack([np.where(warp, s, across), np.where(warp, across, s), height + offset[..., 1]], axis=-1)
+    directors = _directors(offset_slope[..., 0], slope + offset_slope[..., 1], warp)
+    return CentreLines(yarn, length, xi, position, directors)
 
 
 def yarn_height(u: Floats, sides: Ints) -> tuple[Floats, Floats]:
@@ -104,18 +96,20 @@ def _in_crossings(s: Floats, weave: Weave, sides: Ints) -> Floats:
     return np.asarray(s / weave.pitch + (sides.shape[1] - 1) / 2.0, dtype=np.float64)
 
 
-def _directors(slope: Floats, along_x: NDArray[np.bool_]) -> Floats:
-    """(F, K, 2, 3) unit directors turned with the tangent t: g1 horizontal, g2 = t x g1, det[g1 g2 t] = 1."""
-    up = 1.0 / np.sqrt(1.0 + slope**2)
+def _directors(across: Floats, slope: Floats, along_x: NDArray[np.bool_]) -> Floats:
+    """(F, K, 2, 3) unit directors turned with the tangent t: g1 horizontal, g2 = t x g1, det[g1 g2 t] = 1.
+
+    `across` and `slope` (F, K) are the derivatives of the centre line's place across the yarn and of its height.
+    """
+    # The left of one who looks along the yarn: y for the warp, -x for the weft. 0.0 - x makes no negative zero.
+    left = np.where(along_x, across, 0.0 - across)
+    flat = 1.0 / np.sqrt(1.0 + left**2)
+    up = flat / np.sqrt(1.0 + left**2 + slope**2)
+    g1 = 0.0 - left * flat, flat
+    g2 = -slope * up, 0.0 - left * slope * up
     directors: Floats = np.zeros((*slope.shape, 2, 3))
-    directors[..., 0, 0] = np.where(along_x, 0.0, -1.0)
-    directors[..., 0, 1] = np.where(along_x, 1.0, 0.0)
-    directors[..., 1, 0] = np.where(along_x, -slope * up, 0.0)
-    directors[..., 1, 1] = np.where(along_x, 0.0, -slope * up)
-    directors[..., 1, 2] = up
+    for number, (along, sideways) in enumerate((g1, g2)):
+        directors[..., number, 0] = np.where(along_x, along, 0.0 - sideways)
+        directors[..., number, 1] = np.where(along_x, sideways, along)
+    directors[..., 1, 2] = (1.0 + left**2) * up
     return directors
-
-
-def _centred(n: int) -> Floats:
-    """n numbers one apart, about zero."""
-    return np.arange(n, dtype=np.float64) - (n - 1) / 2.0

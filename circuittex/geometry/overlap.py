@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from circuittex.design import Weave
+from circuittex.design.packing import Packing
 from circuittex.errors import DesignError
 from circuittex.geometry.centre_lines import centre_lines
 from circuittex.geometry.mesh import Floats, Ints
@@ -17,16 +18,19 @@ _CHUNK = 50_000  # chords searched at a time, which bounds the memory
 _SLACK = 1e-6  # mm: a start of exactly one radius is allowed whatever the rounding
 
 
-def check_overlaps(weave: Weave) -> None:
+def check_overlaps(weave: Weave, packing: Packing = Packing()) -> None:  # noqa: B008 (frozen)
     """Refuse a weave in which two fibrils start more than the smaller of their radii inside one another.
 
     The overlap is R + R' - d, d the smallest distance of the centre lines, sampled independently of the mesh.
-    The `DesignError` names the deepest pair and the key of the design that moves the two apart.
+    The `DesignError` names the deepest pair and the key of the design that moves the two apart: the seed of the
+    `packing` where the regular one is in order.
 
     >>> from circuittex.design import plain_weave
     >>> check_overlaps(plain_weave(yarns=2).weave)
     """
-    lines = centre_lines(weave, _SAMPLES * max(len(weave.warp), len(weave.weft)) + 1)
+    if not packing.regular:
+        check_overlaps(weave)
+    lines = centre_lines(weave, _SAMPLES * max(len(weave.warp), len(weave.weft)) + 1, packing)
     radius = np.array([kind.radius for kind in weave.yarns])[lines.yarn]
     deepest, pair = 0.0, (0, 0)
     for first, second, distance in near_pairs(lines.position, float(radius.max())):
@@ -36,7 +40,7 @@ def check_overlaps(weave: Weave) -> None:
         if excess[worst] > deepest:
             deepest, pair = float(excess[worst]), (int(first[worst]), int(second[worst]))
     if deepest > _SLACK:
-        raise _refusal(weave, lines.yarn, min(pair), max(pair), deepest)
+        raise _refusal(weave, packing, lines.yarn, min(pair), max(pair), deepest)
 
 
 def segment_distance(p: Floats, q: Floats, r: Floats, s: Floats) -> Floats:
@@ -89,7 +93,7 @@ def _dot(a: Floats, b: Floats) -> Floats:
     return np.asarray(np.einsum("ij,ij->i", a, b), dtype=np.float64)
 
 
-def _refusal(weave: Weave, yarn: Ints, f: int, g: int, excess: float) -> DesignError:
+def _refusal(weave: Weave, packing: Packing, yarn: Ints, f: int, g: int, excess: float) -> DesignError:
     """The error for fibrils f < g: its field is the key that holds the two apart."""
     labels, places = [], []
     for fibril in (f, g):
@@ -97,7 +101,11 @@ def _refusal(weave: Weave, yarn: Ints, f: int, g: int, excess: float) -> DesignE
         labels.append(f"fibril {places[-1] + 1} of {weave.yarn_names[yarn[fibril]]}")
     first, second = weave.yarns[yarn[f]], weave.yarns[yarn[g]]
     allowed = min(first.radius, second.radius)
-    if yarn[f] == yarn[g]:
+    field: str
+    value: float
+    if not packing.regular:
+        field, value = "packing.seed", packing.seed
+    elif yarn[f] == yarn[g]:
         row_ends = np.cumsum(first.rows)
         rows = np.searchsorted(row_ends, places, side="right")
         key = "spacing" if rows[0] == rows[1] else "row_spacing"

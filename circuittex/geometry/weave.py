@@ -24,9 +24,9 @@ def build_mesh(design: Design) -> FibrilMesh:
     (80, 3280, 2)
     """
     weave, numerics = design.weave, design.numerics
-    check_overlaps(weave)
+    check_overlaps(weave, design.packing)
     n_nodes = numerics.order * numerics.elements + 1
-    lines = centre_lines(weave, n_nodes)
+    lines = centre_lines(weave, n_nodes, design.packing)
     n_fibrils = len(lines.yarn)
     first_node = np.arange(n_fibrils + 1) * n_nodes
     within = np.arange(numerics.elements)[:, None] * numerics.order + np.arange(numerics.order + 1)

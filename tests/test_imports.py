@@ -46,6 +46,12 @@ ALLOWED: dict[str, set[str]] = {
     "verify": {*ROUTES, *STATE, "geometry.refine", "design", "spice_names"},
     "verify_reduced": {"circuit", "design", "fit", "netlist", "ngspice"},
     "export": {*STATE, "circuit", "contact.merge", "design", "fit", "netlist"},
+    "discretisation": {"geometry.mesh"},
+    "transfer": {"geometry.mesh", "mech.configuration"},
+    "error_estimate": {
+        *{"design", "geometry", "mech", "contact", "relaxation", "fields", "fit", "results"},
+        *{"discretisation", "transfer"},
+    },
     "results": RESULT_TYPES,
     "store": {*RESULT_TYPES, "results"},
     "tubes": {*RESULT_TYPES, "results"},

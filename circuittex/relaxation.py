@@ -23,7 +23,7 @@ class Equilibrium:
 
     configuration: Configuration
     reaction: Floats
-    """(N, 3) force of the clamps on each node, N; zero inside, up to the residual."""
+    """(N, 3) force of the clamps on each node, N; zero inside and at free ends, up to the residual."""
     section_force: Floats
     """(M, 3) section force ∫ P E3 dA in each element, N."""
     energy: float
@@ -36,10 +36,10 @@ class Equilibrium:
     """(iterations + 1, 4) residual N, potential N mm, shift N/(mm g), step length."""
 
 
-def force_terms(mesh: FibrilMesh, design: Design) -> tuple[BeamSpace, Beam, PenaltyContact]:
+def force_terms(mesh: FibrilMesh, design: Design, free: str = "") -> tuple[BeamSpace, Beam, PenaltyContact]:
     """The space of the fibrils and the two force terms, elasticity and contact, that a design asks for."""
     numerics = design.numerics
-    space = beam_space(mesh)
+    space = beam_space(mesh, free)
     beam = Beam(space, degree=numerics.section_degree)
     contact = PenaltyContact(mesh, space.slot, penalty=design.contact.penalty, per_element=numerics.contact_points)
     return space, beam, contact
@@ -50,14 +50,17 @@ def relax(
     design: Design,
     start: Configuration | None = None,
     *,
+    free: str = "",
     solver: LinearSolver | None = None,
     report: Callable[[int, float], None] | None = None,
 ) -> Equilibrium:
     """The equilibrium that descent from `start` (by default the initial weave) reaches, ends held as there.
 
+    The ends of yarns along `free`, 'x' or 'y', are not held.
+
     Raises `ConvergenceError` with the history where it is not reached.
     """
-    space, beam, contact = force_terms(mesh, design)
+    space, beam, contact = force_terms(mesh, design, free)
     minimum = minimise(
         [beam, contact],
         space.vector(start if start is not None else initial_configuration(mesh)),

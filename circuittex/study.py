@@ -139,13 +139,26 @@ def _states(
     def report(name: str) -> Callable[[int, float], None]:
         return lambda iteration, residual: say(f"{name}: iteration {iteration}, largest free force {residual:.1e} N")
 
+    def tell(name: str) -> Callable[[str], None]:
+        return lambda text: say(f"{name}: {text}")
+
     relaxed = relax(mesh, design, solver=solver, report=report("relaxed"))
     yield "relaxed", "", 0.0, rest, relaxed
     for loading, names in zip(design.loading, state_names(design.loading), strict=True):
         now, before = relaxed, rest
         for name, strain, target in zip(names, loading.strains, loading.gradients, strict=True):
             after = np.array(target)
-            now = advance(mesh, design, now.configuration, before, after, solver=solver, report=report(name))
+            now = advance(
+                mesh,
+                design,
+                now.configuration,
+                before,
+                after,
+                free=loading.free,
+                solver=solver,
+                report=report(name),
+                say=tell(name),
+            ).equilibrium
             before = after
             yield name, loading.name, strain, after, now
 

@@ -152,6 +152,21 @@ BAD: list[tuple[list[tuple[Keys, Any]], str, str]] = [
         "1 gra",
     ),
     ([(("loading",), [tomllib.loads(starter())["loading"][0]] * 2)], "loading.name", "taken by 'stretch'"),
+    ([((*LOADING, "unload"), 1)], "loading.stretch.unload", "true or false"),
+    ([((*LOADING, "unload"), True), ((*LOADING, "steps"), 5001)], "loading.stretch.unload", "at most 10000 states"),
+    ([((*LOADING, "free"), "z")], "loading.stretch.free", "one of 'x', 'y'"),
+    ([((*LOADING, "free"), True)], "loading.stretch.free", "one of 'x', 'y'"),
+    ([((*LOADING, "free"), "x")], "loading.stretch.free", "no state moves the ends of the yarns along 'y'"),
+    (
+        [(LOADING, {"name": "s", "kind": "shear", "strains": [0, 0.1], "free": "x"})],
+        "loading.s.free",
+        "nothing would be loaded",
+    ),
+    (
+        [(LOADING, {"name": "b", "kind": "biaxial", "strains": [0.1], "free": "y"})],
+        "loading.b.free",
+        "of kind 'biaxial' takes 'strain', 'steps', 'strains', 'unload'",
+    ),
     # terminals and probes
     ([(("terminals", "common"), "warp2+")], "terminals.common", "list of yarn ends"),
     ([(("terminals", "common"), [])], "terminals.common", "at least one yarn end"),

@@ -29,6 +29,7 @@ from circuittex.design import (
     design_hash,
     equal_steps,
     load_design,
+    load_unload,
     parse_design,
     plain_weave,
     shear,
@@ -96,6 +97,8 @@ def test_the_starter_mentions_every_key() -> None:
     for kind in (Material, Yarn, Numerics, Electrical, Probe):
         for field in dataclasses.fields(kind):
             assert field.name in text
+    for key in ("strains", "gradients", "axis", "unload", "free"):  # of a loading
+        assert f"{key} = " in text
 
 
 def test_the_starter_file_survives_a_byte_order_mark_and_other_line_ends(tmp_path: Path) -> None:
@@ -144,6 +147,36 @@ def test_loadings() -> None:
     assert one_loading(kind="shear", strains=[0.25]).gradients == (((1.0, 0.0), (0.25, 1.0)),)
     there_and_back = one_loading(kind="uniaxial", strains=[0.05, "10 %", 0.05, 0])
     assert there_and_back.strains == (0.05, 0.1, 0.05, 0.0)
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"kind": "uniaxial", "axis": "y", "strain": -0.2, "steps": 2},
+        {"kind": "biaxial", "strains": [0.1, "20 %"]},
+        {"kind": "shear", "strain": 0.2, "steps": 2},
+        {"kind": "path", "gradients": [[[1.1, 0.2], [0, 1]], [[1.1, 0.2], [0, 0.9]]], "strains": [1, 2]},
+    ],
+)
+def test_unloading_goes_back_through_the_same_states_to_rest(keys: dict[str, Any]) -> None:
+    there, back = one_loading(**keys), one_loading(**keys, unload=True)
+    assert one_loading(**keys, unload=False).gradients == there.gradients
+    (one, two), (first, second) = there.gradients, there.strains
+    assert back.gradients == (one, two, one, ((1.0, 0.0), (0.0, 1.0)))
+    assert back.strains == (first, second, first, 0.0)
+    assert same(load_unload(there), back)
+
+
+def test_free_lateral_edges() -> None:
+    assert one_loading(kind="uniaxial", strains=[0.1]).free == ""
+    strip = one_loading(kind="uniaxial", strains=[0.1], free="y", unload=True)
+    assert (strip.free, strip.strains) == ("y", (0.1, 0.0))
+    assert same(strip, load_unload(uniaxial("l", [0.1], free="y")))
+    assert one_loading(kind="uniaxial", axis="y", strains=[0.1], free="x").free == "x"
+    assert one_loading(kind="shear", strains=[0.1], free="y").free == "y"
+    # Edges may be let go without any load; or under one that also moves the start of the free yarns.
+    assert one_loading(kind="path", gradients=[[[1, 0], [0, 1]]], free="x").free == "x"
+    assert one_loading(kind="path", gradients=[[[1.1, 0], [0, 1.1]]], free="x").free == "x"
 
 
 @pytest.mark.parametrize(
@@ -196,6 +229,12 @@ def test_python_designs_are_checked_and_normalised() -> None:
         Material("m", 1.0, 0.49, 1.0, 1.0, 1.0)
     with pytest.raises(DesignError, match=r"^loading\.l\.gradients\[0\]: .* determinant"):
         Loading("l", (((1.0, 0.0), (0.0, 0.0)),), (0.0,))
+    with pytest.raises(DesignError, match=r"^loading\.l\.axis: 'z' .*'x', 'y'"):
+        uniaxial("l", [0.1], axis="z")
+    with pytest.raises(DesignError, match=r"^loading\.l\.free: 'x' .*nothing would be loaded"):
+        uniaxial("l", [0.1], free="x")
+    with pytest.raises(DesignError, match=r"^loading\.l\.free: None "):
+        Loading("l", (((1.1, 0.0), (0.0, 1.0)),), (0.1,), free=None)  # type: ignore[arg-type]
     with pytest.raises(DesignError, match=r"^terminals\.t: 2 .*-1 or \+1"):
         Terminal("t", (("warp1", 2),))
     with pytest.raises(DesignError, match=r"^loading\.l\.strains: 2 "):
@@ -248,6 +287,8 @@ def test_hash_sees_every_value() -> None:
         {"loading": (biaxial("l", [0.1]),)},
         {"loading": (shear("l", [0.1]),)},
         {"loading": (shear("l", [0.1 + 1e-16]),)},
+        {"loading": (shear("l", [0.1], free="y"),)},
+        {"loading": (load_unload(shear("l", [0.1])),)},
         {"probes": ()},
         {"electrical": Electrical(conduction="current")},
         {"electrical": Electrical(contact_heat=False)},

@@ -1,6 +1,16 @@
 """What the user states: a frozen, validated `Design`, from TOML, from a mapping, or from Python."""
 
-from circuittex.design.experiment import Gradient, Loading, Probe, Terminal, biaxial, equal_steps, shear, uniaxial
+from circuittex.design.experiment import (
+    Gradient,
+    Loading,
+    Probe,
+    Terminal,
+    biaxial,
+    equal_steps,
+    load_unload,
+    shear,
+    uniaxial,
+)
 from circuittex.design.fabric import ContactLaw, Material, Weave, Yarn
 from circuittex.design.files import load_design, parse_design, starter
 from circuittex.design.paper import plain_weave
@@ -22,6 +32,7 @@ __all__ = [
     "design_hash",
     "equal_steps",
     "load_design",
+    "load_unload",
     "parse_design",
     "plain_weave",
     "shear",

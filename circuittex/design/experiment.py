@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from fractions import Fraction
 from math import inf
 
-from circuittex.design.checks import name, real, refuse, store
+from circuittex.design.checks import name, one_of, real, refuse, store
 from circuittex.frozen import frozen
 
 Gradient = tuple[tuple[float, float], tuple[float, float]]
 """In-plane deformation gradient ((Fxx, Fxy), (Fyx, Fyy))."""
+REST: Gradient = ((1.0, 0.0), (0.0, 1.0))
 
 
 @frozen
@@ -26,6 +27,8 @@ class Loading:
     """((Fxx, Fxy), (Fyx, Fyy)) of each state."""
     strains: tuple[float, ...]
     """The strain that labels each state."""
+    free: str = ""
+    """'x' or 'y': the ends of all yarns along that axis are let go, as the lateral edges of a strip test."""
 
     def __post_init__(self) -> None:
         at = f"loading.{name(self.name, 'loading.name')}"
@@ -40,17 +43,18 @@ class Loading:
             gradients=tuple(check_gradient(F, f"{at}.gradients[{i}]") for i, F in enumerate(self.gradients)),
             strains=tuple(real(e, f"{at}.strains[{i}]") for i, e in enumerate(self.strains)),
         )
+        check_free(self.free, self.gradients, f"{at}.free")
 
 
-def uniaxial(name: str, strains: Sequence[float], axis: str = "x") -> Loading:
-    """Stretch along `axis` with the other direction held: F = I + e e_axis x e_axis.
+def uniaxial(name: str, strains: Sequence[float], axis: str = "x", free: str = "") -> Loading:
+    """Stretch along `axis` with the other direction held, or `free`: F = I + e e_axis x e_axis.
 
     >>> uniaxial("stretch", equal_steps(0.1, 4)).gradients[3]
     ((1.1, 0.0), (0.0, 1.0))
     """
-    along_x = axis == "x"
+    along_x = one_of(axis, f"loading.{name}.axis", ("x", "y")) == "x"
     gradients = tuple(((1.0 + e, 0.0), (0.0, 1.0)) if along_x else ((1.0, 0.0), (0.0, 1.0 + e)) for e in strains)
-    return Loading(name, gradients, tuple(strains))
+    return Loading(name, gradients, tuple(strains), free)
 
 
 def biaxial(name: str, strains: Sequence[float]) -> Loading:
@@ -62,13 +66,23 @@ def biaxial(name: str, strains: Sequence[float]) -> Loading:
     return Loading(name, tuple(((1.0 + e, 0.0), (0.0, 1.0 + e)) for e in strains), tuple(strains))
 
 
-def shear(name: str, strains: Sequence[float]) -> Loading:
+def shear(name: str, strains: Sequence[float], free: str = "") -> Loading:
     """Simple shear, y displacement proportional to X: F = I + g e2 x e1.
 
     >>> shear("shear", [0.25]).gradients
     (((1.0, 0.0), (0.25, 1.0)),)
     """
-    return Loading(name, tuple(((1.0, 0.0), (g, 1.0)) for g in strains), tuple(strains))
+    return Loading(name, tuple(((1.0, 0.0), (g, 1.0)) for g in strains), tuple(strains), free)
+
+
+def load_unload(loading: Loading) -> Loading:
+    """The loading, then the same states back to where it started: the relaxed cell's gradient, F = I, at strain 0.
+
+    >>> load_unload(uniaxial("cycle", (0.05, 0.1))).strains
+    (0.05, 0.1, 0.05, 0.0)
+    """
+    gradients = (*loading.gradients, *loading.gradients[-2::-1], REST)
+    return Loading(loading.name, gradients, (*loading.strains, *loading.strains[-2::-1], 0.0), loading.free)
 
 
 def equal_steps(strain: float, steps: int) -> tuple[float, ...]:
@@ -79,6 +93,19 @@ def equal_steps(strain: float, steps: int) -> tuple[float, ...]:
     """
     exact = Fraction(repr(strain))
     return tuple(float(exact * i / steps) for i in range(1, steps + 1))
+
+
+def check_free(free: str, gradients: Sequence[Gradient], field: str) -> None:
+    """Refuse to free the edges that a loading is about: what is left held must be moved, or nothing moved at all.
+
+    >>> check_free("y", uniaxial("strip", (0.1,)).gradients, "loading.strip.free")
+    """
+    if not one_of(free, field, ("", "x", "y")) or all(F == REST for F in gradients):
+        return
+    held = 1 if free == "x" else 0  # the axis along which the clamped yarns run
+    if all((F[0][held], F[1][held]) == (REST[0][held], REST[1][held]) for F in gradients):
+        left = "xy"[held]
+        raise refuse(field, free, f"nothing would be loaded: no state moves the ends of the yarns along {left!r}")
 
 
 def check_gradient(gradient: object, field: str) -> Gradient:

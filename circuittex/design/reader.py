@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from math import hypot, inf
 from typing import TypeVar
 
-from circuittex.design.checks import is_name, name, one_of, real, refuse, whole
+from circuittex.design.checks import is_name, name, one_of, real, refuse, truth, whole
 from circuittex.design.experiment import (
     Gradient,
     Loading,
@@ -16,6 +16,7 @@ from circuittex.design.experiment import (
     biaxial,
     check_gradient,
     equal_steps,
+    load_unload,
     shear,
     uniaxial,
 )
@@ -41,10 +42,10 @@ _CONTACT_UNITS = {"penalty": "N/mm2", "conductivity": "S/mm2", "heat_transfer": 
 _NUMERICS_UNITS = {"tolerance": "N", "merge_length": "mm", "snap_length": "mm", "drop_fraction": "1"}
 _PACKING_UNITS = {"lateral": "mm", "vertical": "mm", "twist": "1/mm", "phase": "mm"}
 _LOADING_KEYS = {
-    "uniaxial": ("strain", "steps", "strains", "axis"),
-    "biaxial": ("strain", "steps", "strains"),
-    "shear": ("strain", "steps", "strains"),
-    "path": ("gradients", "strains"),
+    "uniaxial": ("strain", "steps", "strains", "axis", "unload", "free"),
+    "biaxial": ("strain", "steps", "strains", "unload"),
+    "shear": ("strain", "steps", "strains", "unload", "free"),
+    "path": ("gradients", "strains", "unload", "free"),
 }
 
 
@@ -163,7 +164,8 @@ def _contact(value: object) -> ContactLaw:
 
 
 def _loading(value: object, path: str) -> Loading:
-    table = Table(value, path, ("name", "kind", "axis", "strain", "steps", "strains", "gradients"))
+    keys = dict.fromkeys(key for taken in _LOADING_KEYS.values() for key in taken)
+    table = Table(value, path, ("name", "kind", *keys))
     label = name(table.get("name", "a name for the loading"), table.at("name"))
     kinds = tuple(_LOADING_KEYS)
     kind = one_of(table.get("kind", "one of " + ", ".join(map(repr, kinds))), table.at("kind"), kinds)
@@ -171,20 +173,28 @@ def _loading(value: object, path: str) -> Loading:
         if key not in ("name", "kind", *_LOADING_KEYS[kind]):
             allowed = ", ".join(map(repr, _LOADING_KEYS[kind]))
             raise refuse(table.at(key), table.value[key], f"a loading of kind {kind!r} takes {allowed}")
-    if kind == "path":
-        return _path(table, label)
+    free = one_of(table.value["free"], table.at("free"), ("x", "y")) if table.has("free") else ""
+    loading = _path(table, label, free) if kind == "path" else _stepped(table, label, kind, free)
+    if not truth(table.value.get("unload", False), table.at("unload")):
+        return loading
+    _limit(table, "unload", 2 * len(loading.strains))
+    return load_unload(loading)
+
+
+def _stepped(table: Table, label: str, kind: str, free: str) -> Loading:
     strains = _strains(table, above=-inf if kind == "shear" else -1.0)
     if kind == "uniaxial":
-        return uniaxial(label, strains, one_of(table.value.get("axis", "x"), table.at("axis"), ("x", "y")))
-    return shear(label, strains) if kind == "shear" else biaxial(label, strains)
+        axis = one_of(table.value.get("axis", "x"), table.at("axis"), ("x", "y"))
+        return uniaxial(label, strains, axis, free)
+    return shear(label, strains, free) if kind == "shear" else biaxial(label, strains)
 
 
-def _path(table: Table, label: str) -> Loading:
+def _path(table: Table, label: str, free: str) -> Loading:
     listed = table.items("gradients", "one matrix [[Fxx, Fxy], [Fyx, Fyy]] for each state")
     _limit(table, "gradients", len(listed))
     gradients = tuple(check_gradient(F, f"{table.at('gradients')}[{i}]") for i, F in enumerate(listed))
     labels = _numbers(table, "strains") if table.has("strains") else tuple(_size(F) for F in gradients)
-    return Loading(label, gradients, labels)
+    return Loading(label, gradients, labels, free)
 
 
 def _size(gradient: Gradient) -> float:

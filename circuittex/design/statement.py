@@ -57,7 +57,7 @@ class Numerics:
     tolerance: float = 1e-6
     """Largest free force at equilibrium, N."""
     max_iterations: int = 200
-    """Newton iterations before a relaxation is given up."""
+    """Newton iterations before a relaxation is given up; an increment of a loading path is then made in halves."""
     merge_length: float = 1.0
     """Contacts of a fibril pair within bins of this length become one resistor in the netlists, mm; 0 keeps all. At
     most the length of the longest fibril."""

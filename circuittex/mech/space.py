@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import skfem
 
+from circuittex.design.checks import one_of
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
 from circuittex.mech.configuration import Configuration
@@ -37,7 +38,7 @@ class BeamSpace:
     mass_line: Floats
     """(M, n, n) integrals of products of shape functions, mm."""
     fixed: Ints
-    """prescribed unknowns: r of every fibril end [49]; the directors are free [50, 51]."""
+    """prescribed unknowns: r of every fibril end that is held [49]; the directors are free [50, 51]."""
 
     @property
     def n_dofs(self) -> int:
@@ -76,8 +77,8 @@ def gauss(points: int) -> tuple[Floats, Floats]:
     return (t[None, :] + 1) / 2, w / 2
 
 
-def beam_space(mesh: FibrilMesh) -> BeamSpace:
-    """The space for a mesh, with every fibril end's position prescribed."""
+def beam_space(mesh: FibrilMesh, free: str = "") -> BeamSpace:
+    """The space for a mesh, every fibril end's position prescribed but for those of yarns along `free`, 'x' or 'y'."""
     basis = vector_basis(mesh)
     scalar = skfem.Basis(basis.mesh, type(basis.elem.elem)(), quadrature=gauss(mesh.order))
     exact = skfem.Basis(basis.mesh, type(basis.elem.elem)(), quadrature=gauss(mesh.order + 1))
@@ -93,7 +94,9 @@ def beam_space(mesh: FibrilMesh) -> BeamSpace:
     local = np.asarray(basis.element_dofs)[::DOFS].T[:, axis_order] // DOFS
     slot = np.empty(mesh.n_nodes, dtype=np.int64)
     slot[mesh.elements] = local
-    ends = np.concatenate([mesh.end_nodes(-1), mesh.end_nodes(+1)])
+    axis = ("x", "y", "").index(one_of(free, "free", ("x", "y", "")))
+    held = mesh.yarn_axis[mesh.yarn] != axis
+    ends = np.concatenate([mesh.end_nodes(-1)[held], mesh.end_nodes(+1)[held]])
     return BeamSpace(
         mesh=mesh,
         slot=slot,

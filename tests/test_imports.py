@@ -57,8 +57,10 @@ ALLOWED: dict[str, set[str]] = {
     "tubes": {*RESULT_TYPES, "results"},
     "vtu": {*RESULT_TYPES, "results", "tubes"},
     "summary": {*RESULT_TYPES, "results"},
-    "plot": {*RESULT_TYPES, "results", "tubes", "summary"},
-    "report": {*RESULT_TYPES, "results", "summary", "plot"},
+    "paths": {*RESULT_TYPES, "results"},
+    "plot": {*RESULT_TYPES, "results", "tubes", "summary", "paths"},
+    "claims": {*RESULT_TYPES, "geometry.levels", "results", "tubes", "summary", "paths"},
+    "report": {*RESULT_TYPES, "results", "summary", "paths", "claims", "plot"},
     "study": {
         *{"design", "geometry", "mech", "contact", "relaxation", "increment", "fields", "fit", "verify"},
         *{"verify_reduced", "export", "results", *OUTPUTS},

@@ -20,11 +20,21 @@ from synthetic_study import INSULATED, synthetic_study
 
 from circuittex.geometry.mesh import FibrilMesh, Floats
 from circuittex.mech.configuration import initial_configuration
-from circuittex.plot import FIGURES, force_figure, network_figure, probe_figure, save_figures, section_figure
-from circuittex.plot.curves import loading_paths
+from circuittex.paths import farthest, loading_paths, turns
+from circuittex.plot import (
+    FIGURES,
+    conductance_figure,
+    force_figure,
+    network_figure,
+    probe_figure,
+    save_figures,
+    section_figure,
+    strained_figure,
+)
 from circuittex.plot.cut import cut
 from circuittex.plot.scene import camera, draw_tubes
 from circuittex.plot.style import save, style
+from circuittex.results import Study
 from circuittex.store.archive import Digests
 
 STUDY = synthetic_study(2, contacts=40, rows=(3,), paths=("stretch", "shear"))
@@ -91,7 +101,7 @@ def test_the_upper_fibril_hides_the_lower(height: float) -> None:
     axes.set_axis_off()
     colours = ScalarMappable(Normalize(0.0, 1.0), "gray")
     values = np.where(np.repeat([0, 1], 8) == 1, 1.0, 0.4)
-    draw_tubes(axes, mesh, x, values, colours, camera(-90.0, 90.0), 16)
+    draw_tubes(axes, mesh, x, values, colours, camera(-90.0, 90.0), 400)
     axes.set(xlim=(0.0, 4.0), ylim=(-2.0, 2.0))
     canvas.draw()
     pixels = np.asarray(canvas.buffer_rgba())[..., 0]
@@ -152,13 +162,67 @@ def test_every_path_starts_at_the_relaxed_state() -> None:
     assert list(loading_paths(replace(STUDY, records=STUDY.records[:1]))) == [""]
 
 
-def test_curves_carry_the_numbers() -> None:
-    left, right = force_figure(STUDY).axes
-    drawn = {line.get_label(): line.get_ydata() for line in left.lines}
-    assert list(drawn["Fx, stretch"]) == [STUDY.records[0].clamp_force[0, 0], STUDY.records[1].clamp_force[0, 0]]
-    assert len(right.lines) == 6
+def with_strains(strains: tuple[float, ...]) -> Study:
+    """One path with these strains after the relaxed state, forces as large as the strain."""
+    rest, some = STUDY.records[:2]
+    states = [replace(some, name=f"cycle-{i}", path="cycle", strain=e) for i, e in enumerate(strains)]
+    return replace(STUDY, records=(rest, *(replace(r, clamp_force=np.full((2, 3), r.strain)) for r in states)))
+
+
+def test_a_path_has_come_farthest_before_it_turns_back() -> None:
+    cycle = loading_paths(with_strains((0.1, 0.2, 0.1, 0.2, 0.0)))["cycle"]
+    assert farthest(cycle).name == "cycle-1"
+    assert turns([record.strain for record in cycle]) == [2, 3, 4]
+    compressed = loading_paths(with_strains((0.1, -0.3)))["cycle"]
+    assert farthest(compressed).strain == -0.3
+
+
+def test_forces_of_every_path_and_direction_have_a_panel() -> None:
+    panels = force_figure(STUDY).axes
+    assert [axes.get_title() for axes in panels] == [
+        f"{path}: {clamps}"
+        for path in ("stretch", "shear")
+        for clamps in ("warp clamps, +x ends", "weft clamps, +y ends")
+    ]
+    drawn = {line.get_label(): line.get_ydata() for line in panels[3].lines}
+    assert list(drawn["Fy"]) == [STUDY.records[0].clamp_force[1, 1], STUDY.records[2].clamp_force[1, 1]]
     labels = [str(line.get_label()) for line in network_figure(synthetic_study(2, contacts=4)).axes[0].lines]
     assert labels[-1] == f"insulated, {INSULATED:.4g} Ω"
+
+
+def test_one_colour_for_each_probe_and_one_line_for_each_path() -> None:
+    panels = conductance_figure(STUDY).axes
+    lines = [[line for line in axes.lines if not str(line.get_label()).startswith("_")] for axes in panels]
+    assert [[line.get_label() for line in panel] for panel in lines] == [["stretch", "shear"]] * 3
+    colours = [{line.get_color() for line in panel} for panel in lines]
+    assert [len(colour) for colour in colours] == [1, 1, 1]
+    assert len(set.union(*colours)) == 3
+    assert list(lines[2][1].get_ydata()) == [STUDY.records[0].currents[2], STUDY.records[2].currents[2]]
+
+
+def test_the_way_back_is_marked() -> None:
+    figure = force_figure(with_strains((0.1, 0.2, 0.1, 0.0)))
+    marks = [line for line in figure.axes[0].lines if line.get_label() not in ("Fx", "Fy", "Fz")]
+    outwards, back = marks[0], marks[1]
+    assert list(outwards.get_xdata()) == [0.0, 0.1, 0.2]
+    assert list(back.get_xdata()) == [0.1, 0.0]
+    assert back.get_markerfacecolor() == "white"
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["strain growing", "on the way back"]
+    assert force_figure(STUDY).legends == []
+
+
+def test_every_probe_of_every_path_has_a_picture_of_one_scale() -> None:
+    panels = [axes for axes in probe_figure(STUDY, STUDY.records[1:], "current").axes if axes.get_title()]
+    assert [axes.get_title().split("\n")[0] for axes in panels] == [
+        f"{record.name}, probe {probe.name}" for record in STUDY.records[1:] for probe in STUDY.design.probes
+    ]
+    sizes = {(round(np.ptp(axes.get_xlim()), 9), round(np.ptp(axes.get_ylim()), 9)) for axes in panels}
+    assert len(sizes) == 1
+
+
+def test_strained_cells_are_those_of_the_largest_strain() -> None:
+    titles = [axes.get_title() for axes in strained_figure(STUDY).axes]
+    assert [title for title in titles if title] == ["stretch-0.0250: section force", "shear-0.0250: section force"]
 
 
 def test_all_axes_of_curves_have_units() -> None:
@@ -173,13 +237,21 @@ def test_figures_of_a_study_without_loading(name: str) -> None:
     assert isinstance(FIGURES[name](replace(STUDY, records=STUDY.records[:1])), Figure)
 
 
-def test_study_without_probes_has_no_figures_of_them(tmp_path: Path) -> None:
+def test_study_without_probes_has_no_figures_of_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("cell", "section", "strained", "verification"):  # these take long
+        monkeypatch.delitem(FIGURES, name)
     bare = replace(
         STUDY,
         design=replace(STUDY.design, probes=()),
         records=tuple(replace(record, fields=()) for record in STUDY.records),
     )
-    assert set(save_figures(bare, tmp_path)) == {"cell", "section", "forces", "verification"}
+    assert set(save_figures(bare, tmp_path)) == {"forces"}
+
+
+def test_study_without_loading_has_no_strained_cells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in set(FIGURES) - {"forces", "strained"}:  # the others take long
+        monkeypatch.delitem(FIGURES, name)
+    assert set(save_figures(replace(STUDY, records=STUDY.records[:1]), tmp_path)) == {"forces"}
 
 
 def test_fields_without_any_current() -> None:
@@ -188,6 +260,6 @@ def test_fields_without_any_current() -> None:
         replace(f, segment_current=0 * f.segment_current, temperature=0 * f.temperature) for f in record.fields
     )
     for quantity in ("current", "temperature"):
-        figure = probe_figure(STUDY, replace(record, fields=silent), quantity)
+        figure = probe_figure(STUDY, (replace(record, fields=silent),), quantity)
         with style():
             figure.draw_without_rendering()

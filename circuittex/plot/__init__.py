@@ -1,18 +1,21 @@
 """Figures of a study, drawn with matplotlib's object interface: nothing global is touched."""
 
-from circuittex.plot.curves import conductance_figure, force_figure, network_figure, verification_figure
+from circuittex.plot.checks import convergence_figure, verification_figure
+from circuittex.plot.curves import conductance_figure, force_figure, network_figure
 from circuittex.plot.gallery import FIGURES, save_figures
 from circuittex.plot.section import section_figure
-from circuittex.plot.weave import cell_figure, probe_figure
+from circuittex.plot.weave import cell_figure, probe_figure, strained_figure
 
 __all__ = [
     "FIGURES",
     "cell_figure",
     "conductance_figure",
+    "convergence_figure",
     "force_figure",
     "network_figure",
     "probe_figure",
     "save_figures",
     "section_figure",
+    "strained_figure",
     "verification_figure",
 ]

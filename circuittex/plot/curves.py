@@ -1,117 +1,83 @@
-"""Forces, currents, network resistances and route differences of all recorded states."""
+"""Forces, currents and network resistances against strain."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
+from circuittex.geometry.mesh import Floats
+from circuittex.paths import loading_paths, turns
 from circuittex.plot.style import COLOURS, GREY, LINES, MARKERS, new_figure, style
 from circuittex.results import Record, Study
 from circuittex.summary import insulated_resistance
-from circuittex.verify import AGREEMENT
 
-
-def loading_paths(study: Study) -> dict[str, tuple[Record, ...]]:
-    """The records of each loading path, the relaxed state first: every path starts there."""
-    start = tuple(record for record in study.records if not record.path)
-    names = dict.fromkeys(record.path for record in study.records if record.path)
-    return {name: start + tuple(r for r in study.records if r.path == name) for name in names} or {"": start}
+CLAMPS = ("warp clamps, +x ends", "weft clamps, +y ends")
+MOST_COLUMNS = 3
 
 
 def force_figure(study: Study) -> Figure:
-    """Total clamp force on the +x ends of the warp and the +y ends of the weft, all components, N [40, 41]."""
+    """Total clamp force in all components, N [40, 41]: for each loading path the warp's above the weft's."""
+    paths = loading_paths(study)
+    columns = min(len(paths), MOST_COLUMNS)
+    rows = 2 * -(-len(paths) // columns)
     with style():
-        figure = new_figure(8.0, 3.4)
-        left, right = figure.subplots(1, 2)
-        for side, (axes, ends) in enumerate(((left, "+x ends of the warp"), (right, "+y ends of the weft"))):
-            for component, name in enumerate(("Fx", "Fy", "Fz")):
-                _plot_paths(axes, study, _clamp_force(side, component), component, name)
-            axes.set_title(f"clamps at the {ends}")
-            axes.set_ylabel("force (N)")
-        _finish(figure, study)
+        figure = new_figure(max(4.0 * columns, 4.6), 2.7 * rows)
+        for number, (path, records) in enumerate(paths.items()):
+            block, column = divmod(number, columns)
+            for side, clamps in enumerate(CLAMPS):
+                axes = figure.add_subplot(rows, columns, (2 * block + side) * columns + column + 1)
+                for component, name in enumerate(("Fx", "Fy", "Fz")):
+                    _line(axes, records, _clamp_force(side, component), COLOURS[component], component, name)
+                axes.set_title(f"{path}: {clamps}" if path else clamps)
+                axes.set_ylabel("force (N)")
+        _finish(figure, list(paths.values()), [path for path in paths for _ in CLAMPS])
     return figure
 
 
 def conductance_figure(study: Study) -> Figure:
     """Current of each probe against strain, A, one panel for each probe: their sizes differ by orders."""
-    probes = study.design.probes
+    probes, paths = study.design.probes, loading_paths(study)
+    columns = min(len(probes), MOST_COLUMNS)
+    rows = -(-len(probes) // columns)
     with style():
-        figure = new_figure(max(2.9 * len(probes), 3.4), 3.2)
+        figure = new_figure(max(3.1 * columns, 3.6), 3.2 * rows)
         for number, probe in enumerate(probes):
-            axes = figure.add_subplot(1, len(probes), number + 1)
-            _plot_paths(axes, study, _current(number), number, "")
+            axes = figure.add_subplot(rows, columns, number + 1)
+            for k, (path, records) in enumerate(paths.items()):
+                _line(axes, records, _current(number), COLOURS[number % len(COLOURS)], k, path)
             axes.set_title(f"probe {probe.name}")
             axes.set_ylabel(f"current at {probe.voltage:g} V (A)")
-        _finish(figure, study)
+        _finish(figure, list(paths.values()), [])
     return figure
 
 
 def network_figure(study: Study) -> Figure:
     """Ry and Rc of the reduced network [43-47] against strain, ohm; dashed the Ry of insulated yarns [57]."""
+    paths = loading_paths(study)
     with style():
         figure = new_figure(8.0, 3.4)
         left, right = figure.subplots(1, 2)
-        _plot_paths(left, study, lambda r: r.fit.Ry, 0, "")
+        for k, (path, records) in enumerate(paths.items()):
+            _line(left, records, lambda r: r.fit.Ry, COLOURS[0], k, path)
+            _line(right, records, lambda r: r.fit.Rc, COLOURS[1], k, path)
         insulated = insulated_resistance(study.mesh)
         if np.isfinite(insulated):
             left.axhline(insulated, color=GREY, linestyle="--", linewidth=1.0, label=f"insulated, {insulated:.4g} Ω")
             low, high = left.get_ylim()  # at least 1 % either side, lest differences in the fifth digit fill the axis
             left.set_ylim(min(low, 0.99 * insulated), max(high, 1.01 * insulated))
-        left.set_title("yarn segment")
-        left.set_ylabel("Ry (Ω)")
-        _plot_paths(right, study, lambda r: r.fit.Rc, 1, "")
         for axes, ohms in ((left, [r.fit.Ry for r in study.records]), (right, [r.fit.Rc for r in study.records])):
             if not np.isfinite(ohms).any():
                 axes.text(0.5, 0.5, "infinite or not determined", ha="center", va="center", transform=axes.transAxes)
+        left.set_title("yarn segment")
+        left.set_ylabel("Ry (Ω)")
         right.set_title("crossing")
         right.set_ylabel("Rc (Ω)")
-        _finish(figure, study)
-    return figure
-
-
-def verification_figure(study: Study) -> Figure:
-    """Largest differences between the routes in every recorded state, and the two errors of discretisation."""
-    rows: tuple[tuple[str, Callable[[Record], float]], ...] = (
-        ("node voltages between routes (V per V)", lambda r: r.verification.max_voltage_difference),
-        ("probe currents between routes (relative)", lambda r: r.verification.max_current_difference),
-        ("currents, contacts merged (relative)", lambda r: r.verification.merge_error),
-        ("currents, mechanical mesh (relative)", lambda r: r.verification.field_difference),
-    )
-    places = np.arange(len(study.records))
-    with style():
-        figure = new_figure(7.2, 1.9 + 0.22 * len(places))
-        axes = figure.add_subplot()
-        for number, (label, value) in enumerate(rows):
-            # Equal to the last bit is drawn at the rounding unit: a logarithm has no zero.
-            size = np.maximum([abs(value(record)) for record in study.records], np.finfo(float).eps)
-            axes.plot(size, places, MARKERS[number], color=COLOURS[number], label=label, markersize=5)
-        required = f"required of the routes, {AGREEMENT:.0e}"
-        axes.axvline(AGREEMENT, color=GREY, linestyle="--", linewidth=1.0, label=required)
-        axes.set_xscale("log")
-        axes.set_yticks(places, [record.name for record in study.records])
-        axes.set_ylim(len(places) - 0.5, -0.5)
-        axes.set_xlabel("largest difference")
-        figure.legend(loc="outside lower center", ncols=2)
-    return figure
-
-
-def convergence_figure(study: Study) -> Figure:
-    """Current error of the field on the mechanical mesh against its node distance, beside the slope of second order."""
-    with style():
-        figure = new_figure(4.6, 3.2)
-        axes = figure.add_subplot()
-        for number, record in enumerate(r for r in study.records if len(r.field_convergence)):
-            distance, error = record.field_convergence.T
-            error = np.maximum(error, np.finfo(float).eps)  # a logarithm has no zero
-            axes.loglog(distance, error, MARKERS[number], color=COLOURS[number], label=record.name, markersize=5)
-            axes.loglog(distance, error[0] * (distance / distance[0]) ** 2, color=GREY, linestyle="--", linewidth=1.0)
-        axes.set_xlabel("node distance (mm)")
-        axes.set_ylabel("largest relative current error")
-        axes.set_title("dashed: second order")
-        figure.legend(loc="outside lower center")
+        _finish(figure, list(paths.values()), [])
     return figure
 
 
@@ -123,25 +89,42 @@ def _current(number: int) -> Callable[[Record], float]:
     return lambda record: record.currents[number]
 
 
-def _plot_paths(axes: Axes, study: Study, value: Callable[[Record], float], colour: int, label: str) -> None:
-    """One line for each loading path: the colour tells the quantity, marker and dashes tell the path."""
-    paths = loading_paths(study)
-    for number, (path, records) in enumerate(paths.items()):
-        text = ", ".join(part for part in (label, path if len(paths) > 1 else "") if part)
-        axes.plot(
-            [record.strain for record in records],
-            [value(record) for record in records],
-            LINES[number % len(LINES)],
-            marker=MARKERS[number % len(MARKERS)],
-            markersize=4,
-            color=COLOURS[colour % len(COLOURS)],
-            label=text,
-        )
+def _line(
+    axes: Axes, records: Sequence[Record], value: Callable[[Record], float], colour: str, kind: int, label: str
+) -> None:
+    """One quantity along one path; `kind` chooses marker and dashes. States on the way back have hollow markers."""
+    strain = np.array([record.strain for record in records])
+    values = np.array([value(record) for record in records])
+    marker = MARKERS[kind % len(MARKERS)]
+    (line,) = axes.plot(strain, values, LINES[kind % len(LINES)], color=colour, label=label or "_", linewidth=1.3)
+    back = _on_the_way_back(strain)
+    axes.plot(strain[~back], values[~back], marker, color=colour, markersize=4)
+    axes.plot(strain[back], values[back], marker, color=colour, markersize=4.5, markerfacecolor="white")
+    line.set(marker=marker, markersize=4, markevery=[])  # for the legend
+    bends = turns(strain.tolist())
+    branches = zip([0, *bends], [*bends, len(strain) - 1], strict=True) if bends else ()
+    for middle in ((first + last) // 2 for first, last in branches):
+        arrow = {"arrowstyle": "-|>", "color": colour, "shrinkA": 0, "shrinkB": 0}
+        axes.annotate("", (strain[middle + 1], values[middle + 1]), (strain[middle], values[middle]), arrowprops=arrow)
 
 
-def _finish(figure: Figure, study: Study) -> None:
-    paths = [path for path in loading_paths(study) if path]
-    for axes in figure.axes:
-        axes.set_xlabel(f"strain ({paths[0]})" if len(paths) == 1 else "strain")
-        if any(not label.startswith("_") for label in axes.get_legend_handles_labels()[1]):
+def _on_the_way_back(strain: Floats) -> NDArray[np.bool_]:
+    """(n,) whether the step to a state made the strain smaller."""
+    back: NDArray[np.bool_] = np.diff(np.abs(strain), prepend=-np.inf) < 0.0
+    return back
+
+
+def _finish(figure: Figure, paths: Sequence[Sequence[Record]], names: Sequence[str]) -> None:
+    """Labels and legends; `names` are the paths of the panels where each shows but one."""
+    only = names or [records[-1].path if len(paths) == 1 else "" for records in paths[:1] for _ in figure.axes]
+    for axes, name in zip(figure.axes, only, strict=True):
+        axes.set_xlabel(f"strain ({name})" if name else "strain")
+        axes.ticklabel_format(axis="y", useOffset=False)
+        if axes.get_legend_handles_labels()[1]:
             axes.legend()
+    if any(turns([record.strain for record in records]) for records in paths):
+        filled, hollow = (
+            Line2D([], [], marker="o", linestyle="", color=GREY, markerfacecolor=face, markersize=4.5, label=label)
+            for face, label in ((GREY, "strain growing"), ("white", "on the way back"))
+        )
+        figure.legend(handles=[filled, hollow], loc="outside lower center", ncols=2)

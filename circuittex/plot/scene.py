@@ -1,19 +1,21 @@
-"""Tubes in parallel projection: faces turned away are dropped, the others shaded and drawn from back to front."""
+"""Tubes in parallel projection: faces turned away are dropped, the others shaded."""
 
 from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import PolyCollection
 
 from circuittex import tubes
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
+from circuittex.plot.raster import picture
 
 LIGHT = (-0.35, 0.45, 0.82)
 """Direction to the light: right, up, and towards the eye."""
 AMBIENT = 0.42
+SIDES = 16
+"""Faces around a fibril, a multiple of four."""
 
 
 @frozen
@@ -42,38 +44,40 @@ def camera(azimuth: float, elevation: float) -> Camera:
 
 
 def draw_tubes(
-    axes: Axes, mesh: FibrilMesh, x: Floats, values: Floats, scale: ScalarMappable, view: Camera, sides: int
+    axes: Axes, mesh: FibrilMesh, x: Floats, values: Floats, scale: ScalarMappable, view: Camera, pixels: int
 ) -> None:
     """Draw all fibrils in the configuration `x` (N, 3, 3), coloured by `values` (I,) of their spans.
 
-    `sides` faces around a fibril, a multiple of four.
+    They are one picture, in SVG files as well, with `pixels` along its longer side: as tens of thousands of paths an
+    SVG would be slow to open.
     """
-    points = view.project(tubes.surface(mesh, x, sides))
+    points = view.project(tubes.surface(mesh, x, SIDES))
     walls = _walls(points, tubes.spans(mesh))
     caps = np.concatenate([points[mesh.end_nodes(-1)][:, ::-1], points[mesh.end_nodes(+1)]])
     fibrils = np.arange(mesh.n_fibrils)
     first, last = mesh.first_node[:-1] - fibrils, mesh.first_node[1:] - 2 - fibrils
-    span = np.concatenate([np.repeat(np.arange(len(values)), sides), first, last])
-    normal = np.concatenate([_normal(walls), _normal(caps[:, :: sides // 4])])
-    depth = np.concatenate([walls[..., 2].mean(axis=1), caps[..., 2].mean(axis=1)])
-    visible = np.flatnonzero(normal[:, 2] > 0.0)
-    visible = visible[np.argsort(depth[visible], kind="stable")]
+    span = np.concatenate([np.repeat(np.arange(len(values)), SIDES), first, last])
+    normal = np.concatenate([_normal(walls), _normal(caps[:, :: SIDES // 4])])
     light = np.array(LIGHT) / np.linalg.norm(LIGHT)
-    brightness = AMBIENT + (1.0 - AMBIENT) * np.clip(normal[visible] @ light, 0.0, 1.0)
-    colour = scale.to_rgba(values)[span[visible], :3] * brightness[:, None]
-    outlines = [*walls[..., :2], *caps[..., :2]]
-    # Edges in the colour of the face close the hairline gaps of anti-aliasing. An SVG gets the tubes as one picture:
-    # as tens of thousands of paths it would be slow to open.
-    axes.add_collection(
-        PolyCollection(
-            [outlines[face] for face in visible],
-            facecolors=colour,
-            edgecolors=colour,
-            linewidths=0.25,
-            rasterized=True,
-        )
+    brightness = AMBIENT + (1.0 - AMBIENT) * np.clip(normal @ light, 0.0, 1.0)
+    colour = scale.to_rgba(values)[span, :3] * brightness[:, None]
+    seen = normal[:, 2] > 0.0
+    wall, cap = seen[: len(walls)], seen[len(walls) :]
+    triangles = np.concatenate([_fans(walls[wall]), _fans(caps[cap])])
+    colours = np.concatenate(
+        [np.repeat(colour[: len(walls)][wall], 2, axis=0), np.repeat(colour[len(walls) :][cap], SIDES - 2, axis=0)]
     )
-    axes.autoscale_view()
+    drawn = picture(triangles, colours, pixels)
+    axes.imshow(drawn.pixels, extent=drawn.extent, interpolation="antialiased")
+
+
+def _fans(polygons: Floats) -> Floats:
+    """(n (k - 2), 3, 3) triangles of convex polygons (n, k, 3), those of a polygon together."""
+    k = polygons.shape[1]
+    rest = np.arange(1, k - 1)
+    corners = np.stack([np.zeros_like(rest), rest, rest + 1], axis=1)
+    fans: Floats = polygons[:, corners].reshape(-1, 3, 3)
+    return fans
 
 
 def _walls(points: Floats, nodes: Ints) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,6 +14,7 @@ from circuittex import tubes
 from circuittex.fields import Fields
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.paths import farthest, loading_paths
 from circuittex.plot.scene import Camera, camera, draw_tubes
 from circuittex.plot.style import GREY, bare, new_figure, style
 from circuittex.results import Record, Study
@@ -35,37 +36,56 @@ class _Scale:
 
 def cell_figure(study: Study, record: Record) -> Figure:
     """The cell of one state as tubes coloured by the magnitude of the section force |∫ P E3 dA|, N."""
+    return _force_figure(study, (record,), 1150)
+
+
+def strained_figure(study: Study) -> Figure:
+    """The cell where each loading path has come farthest, coloured by section force, N: figure 12 of the paper."""
+    return _force_figure(study, tuple(farthest(records) for records in loading_paths(study).values()), 900)
+
+
+def _force_figure(study: Study, records: Sequence[Record], pixels: int) -> Figure:
+    view = camera(*VIEW)
+    columns = min(len(records), 2)
+    rows = -(-len(records) // columns)
+    panels = []
     with style():
-        figure = new_figure(7.2, 5.0)
-        axes = figure.add_subplot()
-        values = record.section_force[tubes.span_element(study.mesh)]
-        view = camera(*VIEW)
-        scale = _Scale("section force", "N", "viridis", float(values.min()))
-        _draw(axes, study.mesh, record.configuration.x, values, scale, view, 16)
-        _axes_triad(axes, view, record.configuration.r)
-        axes.set_title(f"{record.name}: section force")
+        figure = new_figure(7.2 if columns == 1 else 5.6 * columns, 5.0 * rows)
+        for number, record in enumerate(records):
+            axes = figure.add_subplot(rows, columns, number + 1)
+            values = record.section_force[tubes.span_element(study.mesh)]
+            scale = _Scale("section force", "N", "viridis", float(values.min()))
+            _draw(axes, study.mesh, record.configuration.x, values, scale, view, pixels)
+            _axes_triad(axes, view, record.configuration.r)
+            axes.set_title(f"{record.name}: section force")
+            panels.append(axes)
+        _same_scale(panels, 0.5)
     return figure
 
 
-def probe_figure(study: Study, record: Record, quantity: str) -> Figure:
-    """The `quantity` ('current' or 'temperature') of every probe of one state, each on a scale of its own.
+def probe_figure(study: Study, records: Sequence[Record], quantity: str) -> Figure:
+    """The `quantity` ('current' or 'temperature') of every probe, a row for each state, each on a scale of its own.
 
     The current is the mean of its magnitude over the piece between two mesh nodes of one fibril. A plus marks the
     probe's source, a minus its sink.
     """
     label, unit, colours, value = _QUANTITIES[quantity]
     scale = _Scale(label, unit, colours, 0.0)
+    view = camera(*PROBE_VIEW)
+    columns, panels = len(study.design.probes), []
     with style():
-        figure = new_figure(3.6 * len(record.fields), 3.9)
+        figure = new_figure(3.6 * columns, 3.9 * len(records))
         # The layout counts the height of one line of a title above axes of a fixed aspect; these have two.
-        figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 0.94))
-        for number, fields in enumerate(record.fields):
-            axes = figure.add_subplot(1, len(record.fields), number + 1)
-            view = camera(*PROBE_VIEW)
-            axes.margins(0.13)
-            _draw(axes, study.mesh, record.configuration.x, value(study.mesh, fields), scale, view, 12)
-            _mark_terminals(axes, study, record, fields, view)
-            axes.set_title(f"{record.name}, probe {fields.probe}\n{fields.currents[0]:.4g} A at {fields.voltage:g} V")
+        figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1.0 - 0.06 / len(records)), hspace=0.06)
+        for row, record in enumerate(records):
+            for column, fields in enumerate(record.fields):
+                axes = figure.add_subplot(len(records), columns, row * columns + column + 1)
+                _draw(axes, study.mesh, record.configuration.x, value(study.mesh, fields), scale, view, 620)
+                _mark_terminals(axes, study, record, fields, view)
+                current = f"{fields.currents[0]:.4g} A at {fields.voltage:g} V"
+                axes.set_title(f"{record.name}, probe {fields.probe}\n{current}")
+                panels.append(axes)
+        _same_scale(panels, 1.2)
     return figure
 
 
@@ -85,18 +105,27 @@ _QUANTITIES: dict[str, tuple[str, str, str, Callable[[FibrilMesh, Fields], Float
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
-def _draw(axes: Axes, mesh: FibrilMesh, x: Floats, values: Floats, scale: _Scale, view: Camera, sides: int) -> None:
+def _draw(axes: Axes, mesh: FibrilMesh, x: Floats, values: Floats, scale: _Scale, view: Camera, pixels: int) -> None:
     """Tubes with a colour bar in a unit of the size of the values."""
     largest = float(np.nanmax(np.abs(values), initial=0.0))
     unit, prefix = next((pair for pair in _PREFIXES if largest >= pair[0]), (1.0, ""))
     low, high = scale.low / unit, largest / unit
     colours = ScalarMappable(Normalize(low, high if high > low else low + 1.0), scale.colours)
     bare(axes)
-    draw_tubes(axes, mesh, x, values / unit, colours, view, sides)
+    draw_tubes(axes, mesh, x, values / unit, colours, view, pixels)
     figure = axes.figure
     assert isinstance(figure, Figure)
     bar = figure.colorbar(colours, ax=axes, orientation="horizontal", shrink=0.6, aspect=30, pad=0.02)
     bar.set_label(f"{scale.label} ({prefix}{scale.unit})")
+
+
+def _same_scale(panels: Sequence[Axes], margin: float) -> None:
+    """Every panel shows a piece of the plane of the same size, with `margin` (mm) round the largest picture."""
+    limits = np.array([(axes.get_xlim(), axes.get_ylim()) for axes in panels])
+    half = np.ptp(limits, axis=2).max(axis=0) / 2 + margin
+    for axes, centre in zip(panels, limits.mean(axis=2), strict=True):
+        low, high = centre - half, centre + half
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
 
 
 def _axes_triad(axes: Axes, view: Camera, r: Floats) -> None:
@@ -105,7 +134,7 @@ def _axes_triad(axes: Axes, view: Camera, r: Floats) -> None:
     for direction, name in zip(view.project(np.eye(3)), "xyz", strict=True):
         tip = low[:2] + direction[:2]
         arrow = {"arrowstyle": "-|>", "color": GREY, "shrinkA": 0, "shrinkB": 0}
-        axes.annotate("", tip, low[:2], arrowprops=arrow)
+        axes.annotate("", tip, low[:2], arrowprops=arrow, annotation_clip=False)
         right, up = low[:2] + 1.25 * direction[:2]
         axes.text(right, up, name, ha="center", va="center", color=GREY)
     axes.text(low[0], low[1] - 0.15, "1 mm", ha="center", va="top", color=GREY, fontsize=8)

@@ -6,7 +6,7 @@ sequences that do not converge as theory says; `docs/error_estimate.md` says wha
 
 from __future__ import annotations
 
-from math import inf, isfinite, log2, nan
+from math import exp2, inf, isfinite, log2, nan
 
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import Floats
@@ -116,8 +116,8 @@ def mesh_error(coarse: float, value: float, fine: float) -> float:
         return nan
     order = observed_order(coarse, value, fine)
     if LEAST_ORDER <= order <= FORMAL_ORDER:
-        return SAFETY * finer / (1.0 - 2.0**-order)
-    second_order = SAFETY * coarser / (2.0**FORMAL_ORDER - 1.0) if isfinite(coarser) else 0.0
+        return SAFETY * finer / (1.0 - exp2(-order))
+    second_order = SAFETY * coarser / (exp2(FORMAL_ORDER) - 1.0) if isfinite(coarser) else 0.0
     return second_order if order > FORMAL_ORDER else max(CAUTION * finer, second_order)
 
 
@@ -127,4 +127,4 @@ def contact_error(value: float, more_points: float) -> float:
     Two values show no order; second order, that of the contact points' rule, is taken for granted.
     """
     difference = abs(value - more_points)
-    return SAFETY * difference / (1.0 - 2.0**-FORMAL_ORDER) if isfinite(difference) else nan
+    return SAFETY * difference / (1.0 - exp2(-FORMAL_ORDER)) if isfinite(difference) else nan

@@ -27,6 +27,14 @@ th:first-child { text-align: left; }
 tbody th { font-weight: 500; white-space: nowrap; }
 .good, .bad { padding: .2rem 1rem; border-left: .4rem solid #009e73; background: #eef8f4; }
 .bad { border-color: #d55e00; background: #fdf1e8; font-weight: 600; }
+.claims th, .claims td { text-align: left; vertical-align: top; min-width: 11rem; }
+.claims tbody th { white-space: normal; max-width: 24rem; }
+.claims small { display: block; margin-top: .25rem; font-weight: 400; color: #555; }
+em { display: inline-block; margin-right: .3rem; padding: 0 .4rem; border-radius: .3rem; font-style: normal;
+  font-weight: 600; background: #eee; }
+em.yes { background: #d5efe5; }
+em.partly { background: #fdf0c8; }
+em.no { background: #f9d9c3; }
 footer { margin-top: 3rem; color: #555; font-size: .85rem; }
 @media print {
   body { max-width: none; font-size: 9pt; padding: 0; }
@@ -46,6 +54,7 @@ $figure_section
 <h2>Recorded states</h2>
 $states
 $figure_forces
+$figure_strained
 $figure_probes
 <h2>Fields</h2>
 $figure_currents
@@ -55,6 +64,7 @@ $figure_temperatures
 currents of each state.</p>
 $figure_network
 $network
+$claims
 <h2>Verification</h2>
 <p>Finite elements, a nodal solution of the netlist's circuit and ngspice solve the same network independently of one
 another. Merging is the relative change of a probe current by merging neighbouring contact points for the netlist; the

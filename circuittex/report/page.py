@@ -11,64 +11,52 @@ from string import Template
 
 import numpy as np
 
+from circuittex.claims.table import Table, claims_table
 from circuittex.plot import save_figures
+from circuittex.report.captions import captions
+from circuittex.report.claims import claims_section
 from circuittex.report.frame import PAGE
 from circuittex.results import Record, Study
 from circuittex.summary import agrees, confirmed, difference, insulated_resistance, ngspice_statement
 from circuittex.verify import AGREEMENT
 
-_CAPTIONS = {
-    "cell": "The relaxed cell. Colour: magnitude of the force a fibril's section carries.",
-    "section": "A centre yarn before and after relaxation, cut across at a crossing (left) and along (right): do the "
-    "rows of fibrils (filled circles) settle into fewer levels?",
-    "currents": "Current along the fibrils in the last recorded state, one picture for each probe, each on its own "
-    "scale. Plus marks the source, minus the sink.",
-    "temperatures": "Temperature rise from Joule heating in the last recorded state, each probe on its own scale.",
-    "forces": "Total force of the clamps on the +x ends of the warp and on the +y ends of the weft, by component.",
-    "probes": "Current of each probe against strain.",
-    "network": "The reduced network: resistance Ry of a yarn segment between two crossings (dashed: the same yarn "
-    "without any contacts) and Rc of a crossing.",
-    "verification": "Largest differences between the independent routes to the same voltages and currents, and what "
-    "merging contacts and the finite-element mesh change.",
-    "convergence": "The potential on the mesh of the mechanics, and on two refinements of it, converges to the "
-    "circuit: largest relative error of a probe current in the relaxed state.",
-}
-
-
-def write_report(folder: str | Path, study: Study) -> Path:
+def write_report(folder: str | Path, study: Study, beside: Sequence[Study] = ()) -> Path:
     """Draw the figures into ``folder/figures`` and write ``folder/report.html``; returns its path.
 
-    The page holds its pictures itself and loads nothing; a study without records gives a page that says so.
+    The page holds its pictures itself and loads nothing; a study without records gives a page that says so. Other
+    studies `beside` it have columns of their own in the table of the paper's claims.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     pictures = save_figures(study, folder / "figures") if study.records else {}
     path = folder / "report.html"
-    path.write_text(page(study, {name: file.read_bytes() for name, file in pictures.items()}), encoding="utf-8")
+    path.write_text(page(study, {name: file.read_bytes() for name, file in pictures.items()}, beside), encoding="utf-8")
     return path
 
 
-def page(study: Study, pictures: Mapping[str, bytes]) -> str:
+def page(study: Study, pictures: Mapping[str, bytes], beside: Sequence[Study] = ()) -> str:
     """The whole page as text; `pictures` are PNG files by the names of `circuittex.plot.FIGURES`."""
-    shown = {f"figure_{name}": _figure(name, pictures.get(name)) for name in _CAPTIONS}
+    shown = {f"figure_{name}": _figure(text, pictures.get(name)) for name, text in captions(study).items()}
+    claims = claims_table([study, *beside])
     return Template(PAGE).substitute(
         shown,
         title=escape(study.design.name),
-        facts=_facts(study),
+        facts=_facts(study, claims),
         verdict=_verdict(study),
         states=_states(study),
         network=_network(study),
+        claims=claims_section(claims),
         verification=_verification(study),
         parameters=_parameters(study),
         version=escape(study.version),
     )
 
 
-def _figure(name: str, png: bytes | None) -> str:
+def _figure(caption: str, png: bytes | None) -> str:
     if png is None:
         return ""
     data = base64.b64encode(png).decode("ascii")
-    caption = escape(_CAPTIONS[name])
+    caption = escape(caption)
     image = f'<img alt="{caption}" src="data:image/png;base64,{data}">'
     return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
 
@@ -87,7 +75,7 @@ def _number(value: float, digits: int = 4) -> str:
     return f"{value:.{digits}g}" if value == value else "–"
 
 
-def _facts(study: Study) -> str:
+def _facts(study: Study, claims: Table | None) -> str:
     mesh = study.mesh
     facts = {
         "Design": study.design.name,
@@ -99,6 +87,8 @@ def _facts(study: Study) -> str:
     }
     if study.records:
         facts["Contact points"] = f"{study.records[0].contacts.n_contacts} in state {study.records[0].name}"
+    if claims is not None:
+        facts |= {f"Claims of the paper, {name}": text for name, text in zip(claims.columns, claims.tally, strict=True)}
     return "<dl>" + "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in facts.items()) + "</dl>"
 
 

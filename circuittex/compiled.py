@@ -11,6 +11,10 @@ F = TypeVar("F", bound=Callable[..., object])
 
 
 def compiled(function: F) -> F:
-    """Compile `function` with numba: kept on disk between runs, and free to run beside other threads."""
-    kernel: F = njit(cache=True, nogil=True)(function)
+    """Compile `function` with numba: kept on disk between runs, and free to run beside other threads.
+
+    A division by zero gives what it gives in NumPy. To check every divisor, as Python does, would keep the compiler
+    from computing several at once.
+    """
+    kernel: F = njit(cache=True, nogil=True, error_model="numpy")(function)
     return kernel

@@ -8,7 +8,7 @@ from math import inf, pi
 import numpy as np
 import pytest
 from beams import assembled, dense, rod, stiffness
-from fabrics import fibrils_through, straight
+from fabrics import fibrils_through, small_cell, straight
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -80,6 +80,34 @@ def test_energy_alone_is_that_of_the_assembly(order: int, nu: float) -> None:
     space = beam_space(pair(order, nu))
     beam, q = Beam(space), shaken(space, 3)
     assert beam.energy(q) == pytest.approx(assembled(beam, q)[0], rel=ROUND_OFF)
+
+
+@pytest.mark.parametrize("pieces", [2, 16])
+def test_pieces_and_threads_change_no_bit(pieces: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    _, mesh = small_cell((1, 2), elements=3)
+    space = beam_space(mesh)
+    q = shaken(space, 13)
+    whole, split = [], []
+    for found, number in ((whole, 1), (split, pieces)):
+        monkeypatch.setattr("circuittex.mech.beam.PIECES", number)
+        beam = Beam(space)
+        energy, gradient, _, data = assembled(beam, q)
+        found += [np.array([energy, beam.energy(q)]), gradient, data, beam.section_force(q)]
+    assert all(np.array_equal(a, b) for a, b in zip(whole, split, strict=True))
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.4])
+@pytest.mark.parametrize("stretch", [0.3, 0.79, 0.81, 1.24, 1.26, 4.0])
+def test_energy_of_a_large_stretch(nu: float, stretch: float) -> None:
+    """E A L of a rod with held section: F = diag(1, 1, s), with lambda in full since no section turns; s on both
+    sides of the limits of the logarithm's series."""
+    R, L, E = 0.15, 3.0, 10.0
+    mesh = rod(L, 2, 2, radius=R, modulus=E, poisson=nu)
+    space, x = beam_space(mesh), initial_configuration(mesh).x.copy()
+    x[:, 0] *= stretch
+    mu, lam = E / (2 * (1 + nu)), E * nu / ((1 + nu) * (1 - 2 * nu))
+    density = mu / 2 * (stretch**2 - 1) - mu * np.log(stretch) + lam / 2 * np.log(stretch) ** 2
+    assert Beam(space).energy(space.vector(Configuration(x))) == pytest.approx(density * pi * R**2 * L, rel=1e-13)
 
 
 @pytest.mark.parametrize("order", ORDERS)

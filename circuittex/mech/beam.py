@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from circuittex.geometry.mesh import Floats, Ints
 from circuittex.mech.configuration import Configuration
-from circuittex.mech.kernels import beam_energy, beam_tangent, section_force
+from circuittex.mech.kernels import N_STRAINS, beam_energy, section_force
 from circuittex.mech.material import bending_lambda, lame
 from circuittex.mech.pattern import Pattern, add_elements
 from circuittex.mech.section import disk_rule
 from circuittex.mech.space import DOFS, BeamSpace
+from circuittex.mech.tangent import add_tangent
+
+PIECES = 16
+"""Fibrils are assembled in this many pieces, whatever the number of threads."""
 
 
 class Beam:
@@ -29,23 +37,55 @@ class Beam:
         unit, share = disk_rule(degree)
         if np.any(lam > lam_b):  # one more point, on the axis, for the rest of lambda
             unit, share = np.vstack([unit, [0.0, 0.0]]), np.append(share, 1.0)
-        section = len(unit)
-        on_axis = np.arange(section) >= len(disk_rule(degree)[1])
+        on_axis = np.arange(len(unit)) >= len(disk_rule(degree)[1])
         self.space = space
+        order = np.argsort(space.element_slots, axis=1)  # a row of the matrix begins with its own node
+        self.slots = np.take_along_axis(space.element_slots, order, axis=1)
+        by_line = order[:, None, :]
+        self.shape = np.take_along_axis(space.shape[None] * np.ones((len(fibril), 1, 1)), by_line, axis=2)
+        self.slope = np.take_along_axis(space.slope, by_line, axis=2)
         self.mu = np.where(on_axis, 0.0, mu[fibril, None])
         self.lam = np.where(on_axis, (lam - lam_b)[fibril, None], lam_b[fibril, None])
-        points = unit * mesh.radius[fibril, None, None]
+        self.points = np.swapaxes(unit * mesh.radius[fibril, None, None], 1, 2).copy()
         self.area = share * mesh.area[fibril, None, None] * np.ones_like(space.weight)[..., None]
-        self.weight = self.area * space.weight[..., None]
-        self.L = _strain_matrix(points)[:, None] * np.ones((1, space.weight.shape[1], 1, 1, 1))
+        self.natural, self.metric = _straight(space)
         if natural is not None:
-            self.L, jacobian = _referred(self.L, space, natural)
-            self.area, self.weight = self.area * jacobian, self.weight * jacobian
-        elif np.ptp(mesh.radius) == 0:
-            self.L = self.L[:1]
-        n = space.element_slots.shape[1]
-        self._gradient = np.empty((len(fibril), n, DOFS))
-        self._tangent = np.empty((len(fibril), n, DOFS, n, DOFS))
+            self.natural, self.metric = _curved(self._strains(space.vector(natural)), self.points)
+            self.area = self.area * np.asarray(np.sqrt(np.linalg.det(self.metric)), dtype=np.float64)
+        self.weight = self.area * space.weight[..., None]
+        self.quadratic = self._quadratic()
+        self.stiffness = self._stiffness()
+
+    def _strains(self, q: Floats) -> Floats:
+        """(M, Q, 5, 3) g1, g2, r', g1', g2' at the line points."""
+        x = q.reshape(-1, 3, 3)[self.slots]
+        value, slope = (np.einsum("eqa,eapc->eqpc", table, x) for table in (self.shape, self.slope))
+        return np.concatenate([value[:, :, 1:], slope], axis=2)
+
+    def _quadratic(self) -> Floats:
+        """(M, Q, 5, 5) mu/2 tr F^T F dA = 1/2 u.C u: the matrices C, N."""
+        if self.metric.shape[2] == 0:
+            inverse = np.eye(3) * np.ones((*self.area.shape, 1, 1))
+        else:
+            inverse = np.linalg.inv(self.metric)
+        x, y = self.points[:, 0], self.points[:, 1]
+        to_columns = np.zeros((*x.shape, 3, N_STRAINS))  # F = u^T to_columns^T
+        to_columns[..., [0, 1, 2], [0, 1, 2]] = 1.0
+        to_columns[..., 2, 3], to_columns[..., 2, 4] = x, y
+        return np.asarray(
+            np.einsum(
+                "eqs,es,esim,eqsij,esjn->eqmn", self.area, self.mu, to_columns, inverse, to_columns, optimize=True
+            )
+        )
+
+    def _stiffness(self) -> Floats:
+        """(M, 3 n, 3 n) the same integrated along each element for its nodal vectors r, g1, g2, N/mm."""
+        M, Q, n = self.shape.shape
+        to_strains = np.zeros((M, Q, n, 3, N_STRAINS))
+        to_strains[..., 1, 0] = to_strains[..., 2, 1] = self.shape
+        to_strains[..., 0, 2] = to_strains[..., 1, 3] = to_strains[..., 2, 4] = self.slope
+        B = to_strains.reshape(M, Q, 3 * n, N_STRAINS)
+        return np.asarray(np.einsum("eq,eqkm,eqmp,eqlp->ekl", self.space.weight, B, self.quadratic, B, optimize=True))
 
     def prepare(self, q: Floats) -> bool:
         """Elements couple the same nodes for ever."""
@@ -53,27 +93,43 @@ class Beam:
 
     def pairs(self) -> tuple[Ints, Ints]:
         """All node pairs of each element, with all nine unknowns."""
-        n = self.space.element_slots.shape[1]
+        n = self.slots.shape[1]
         i, j = np.triu_indices(n, 1)
-        full = self.space.element_slots[:, np.stack([i, j], axis=1)].reshape(-1, 2)
+        full = self.slots[:, np.stack([i, j], axis=1)].reshape(-1, 2)
         return full, np.empty((0, 2), dtype=np.int64)
 
-    def _arguments(self, q: Floats, weight: Floats, *out: Floats) -> tuple[Any, ...]:
-        space = self.space
-        x = q.reshape(-1, DOFS)
-        return x, space.element_slots, space.shape, space.slope, weight, self.L, self.mu, self.lam, *out
+    def _arguments(self, q: Floats, weight: Floats) -> tuple[Any, ...]:
+        tables = self.slots, self.shape, self.slope, weight, self.points, self.natural, self.metric, self.mu, self.lam
+        return q.reshape(-1, DOFS), *tables
+
+    def _by_fibrils(self, kernel: Callable[..., object], *arguments: Any) -> None:
+        """Call a kernel for the elements of all fibrils, in pieces on all cores.
+
+        Fibrils share no node: each piece has entries of its own, and the result does not depend on their number.
+        """
+        first = self.space.mesh.first_element
+        edges = np.unique(first[np.linspace(0, len(first) - 1, PIECES + 1).astype(int)]).tolist()
+        pieces = list(pairwise(edges))
+        if len(pieces) == 1:
+            kernel(*pieces[0], *arguments)
+            return
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(lambda piece: kernel(*piece, *arguments), pieces))
 
     def energy(self, q: Floats) -> float:
         """Elastic energy, N mm; infinite where a section has turned inside out."""
-        return float(beam_energy(*self._arguments(q, self.weight)))
+        energy = np.empty(len(self.slots))
+        self._by_fibrils(beam_energy, *self._arguments(q, self.weight), energy)
+        return float(energy.sum())
 
     def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
         """Add gradient and tangent in place, nothing to `softening`; return the energy."""
-        element = self._gradient, self._tangent
-        energy = beam_tangent(*self._arguments(q, self.weight, *element))
-        add_elements(
-            self.space.element_slots,
-            *element,
+        energy = np.empty(len(self.slots))
+        self._by_fibrils(
+            add_tangent,
+            *self._arguments(q, self.weight),
+            self.stiffness,
+            energy,
             pattern.indptr,
             pattern.neighbour_start,
             pattern.neighbour,
@@ -82,12 +138,12 @@ class Beam:
             gradient,
             data,
         )
-        return float(energy)
+        return float(energy.sum())
 
     def section_force(self, q: Floats) -> Floats:
         """(M, 3) section force ∫ P E3 dA at mid-element, N."""
         force = np.empty((*self.space.weight.shape, 3))
-        section_force(*self._arguments(q, self.area, force))
+        self._by_fibrils(section_force, *self._arguments(q, self.area), self.quadratic, force)
         return np.asarray(force.mean(axis=1))
 
     def mass(self, pattern: Pattern) -> Floats:
@@ -115,19 +171,17 @@ class Beam:
         return data
 
 
-def _strain_matrix(points: Floats) -> Floats:
-    """(M, S, 5, 3) matrices L with F = sum_m u_m (x) L_m for section points (M, S, 2)."""
-    L = np.zeros((*points.shape[:2], 5, 3))
-    L[..., 0, 0] = L[..., 1, 1] = L[..., 2, 2] = 1.0
-    L[..., 3, 2], L[..., 4, 2] = points[..., 0], points[..., 1]
-    return L
+def _straight(space: BeamSpace) -> tuple[Floats, Floats]:
+    """Products of the natural strains (1, Q, 5, 5) of straight fibrils, and no metric: theirs is the unit matrix."""
+    lines = space.weight.shape[1]
+    natural = np.zeros((1, lines, N_STRAINS, N_STRAINS))
+    natural[..., [0, 1, 2], [0, 1, 2]] = 1.0
+    return natural, np.empty((1, lines, 0, 3, 3))
 
 
-def _referred(L: Floats, space: BeamSpace, natural: Configuration) -> tuple[Floats, Floats]:
-    """L and the volume ratio for a curved stress-free configuration X0: F = dx/dxi (dX0/dxi)^-1."""
-    x = space.vector(natural).reshape(-1, 3, 3)[space.element_slots]
-    value = np.einsum("qa,eapc->eqpc", space.shape, x)
-    slope = np.einsum("eqa,eapc->eqpc", space.slope, x)
-    u = np.stack([value[:, :, 1], value[:, :, 2], slope[:, :, 0], slope[:, :, 1], slope[:, :, 2]], axis=2)
-    reference = np.einsum("eqmc,eqsmj->eqscj", u, L)
-    return L @ np.linalg.inv(reference), np.linalg.det(reference)
+def _curved(u: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """Products (M, Q, 5, 5) of the natural strains u (M, Q, 5, 3), and the natural metric (M, Q, S, 3, 3)."""
+    x, y = points[:, None, 0, :, None], points[:, None, 1, :, None]
+    u1, u2, u3, u4, u5 = (u[:, :, None, m] for m in range(N_STRAINS))
+    columns = np.stack(np.broadcast_arrays(u1, u2, u3 + x * u4 + y * u5), axis=-1)
+    return np.einsum("eqmc,eqnc->eqmn", u, u), np.einsum("eqsci,eqscj->eqsij", columns, columns)

@@ -1,12 +1,15 @@
 """Compiled loops over beam elements: energy, gradient, tangent and section forces.
 
-With u = (g1, g2, r', g1', g2') at a line point, the deformation gradient at a section point is
-F = sum_m u_m (x) L_m, where the 5 x 3 matrix L holds the section coordinates (and, for a naturally curved
-fibril, the inverse reference gradient). Everything follows from the neo-Hookean density [1] in terms of
-L and y_m = F^-1 L_m:
+With u = (g1, g2, r', g1', g2') at a line point and xi = (1, xi1, xi2) at a section point, the volume ratio is linear
+in the section's coordinates: J = sum_i xi_i j_i, j_i = (g1 x g2) . u_(2+i). The neo-Hookean density [1] is a quadratic
+function of u and a function of J alone, psi = mu/2 (tr F^T F - 3) + f(J), f = -mu ln J + lambda/2 (ln J)^2. So the
+section enters gradient and tangent by nine moments, whatever its number of points:
 
-    dE/du_m        = w (mu F L_m + (lambda ln J - mu) y_m)
-    d2E/du_m du_n  = w (mu (L_m . L_n) I + (mu - lambda ln J) y_n (x) y_m + lambda y_m (x) y_n)
+    dE    = K q + sum_i p_i dj_i,                           p_i  = sum w f'(J) xi_i
+    d2E   = K + sum_i p_i d2j_i + sum_ik A_ik dj_i (x) dj_k,  A_ik = sum w f''(J) xi_i xi_k
+
+with a constant matrix K. Where a fibril is naturally curved J and F are relative to that shape: only the ratio J / J0
+and the metric of its strains change.
 """
 
 from __future__ import annotations
@@ -18,11 +21,15 @@ import numpy as np
 from circuittex.compiled import compiled
 
 N_STRAINS = 5
+LEAST, LARGEST = 0.64, 1.5625
+"""J^2 between which the series of the logarithm serves: |z| < 0.22."""
+SERIES = 12
+"""Its terms: the next is below 0.22^24 / 25 < 1e-17 of the first."""
 
 
 @compiled
-def _strains(slots: Any, x: Any, shape: Any, slope: Any, u: Any) -> None:
-    """Fill u (5, 3) with (g1, g2, r', g1', g2') from the nodal values x (slots, 9)."""
+def strains(slots: Any, x: Any, shape: Any, slope: Any, u: Any, normal: Any) -> None:
+    """Fill u (5, 3) with (g1, g2, r', g1', g2') from the nodal values x (slots, 9), and normal (3,) with g1 x g2."""
     u[:] = 0.0
     for a in range(slots.shape[0]):
         row = x[slots[a]]
@@ -32,156 +39,210 @@ def _strains(slots: Any, x: Any, shape: Any, slope: Any, u: Any) -> None:
             u[2, c] += slope[a] * row[c]
             u[3, c] += slope[a] * row[3 + c]
             u[4, c] += slope[a] * row[6 + c]
-
-
-@compiled
-def _deformation(u: Any, L: Any, F: Any) -> float:
-    """Fill F (3, 3) = sum_m u_m (x) L_m and return det F."""
-    for c in range(3):
-        for j in range(3):
-            total = 0.0
-            for m in range(N_STRAINS):
-                total += u[m, c] * L[m, j]
-            F[c, j] = total
-    return (
-        F[0, 0] * (F[1, 1] * F[2, 2] - F[1, 2] * F[2, 1])
-        - F[0, 1] * (F[1, 0] * F[2, 2] - F[1, 2] * F[2, 0])
-        + F[0, 2] * (F[1, 0] * F[2, 1] - F[1, 1] * F[2, 0])
-    )
-
-
-@compiled
-def _push(F: Any, J: float, L: Any, y: Any) -> None:
-    """Fill y (5, 3) with y_m = F^-T L_m, where (F^-T)_cj = (F^-1)_jc."""
     for c in range(3):
         c1, c2 = (c + 1) % 3, (c + 2) % 3
-        for m in range(N_STRAINS):
-            total = 0.0
-            for j in range(3):
-                j1, j2 = (j + 1) % 3, (j + 2) % 3
-                total += (F[c1, j1] * F[c2, j2] - F[c1, j2] * F[c2, j1]) * L[m, j]
-            y[m, c] = total / J
+        normal[c] = u[0, c1] * u[1, c2] - u[0, c2] * u[1, c1]
 
 
 @compiled
-def _density(F: Any, J: float, mu: float, lam: float) -> float:
-    """The neo-Hookean density [1] for J = det F > 0, to few units of round-off of the result even at small strain.
+def _logarithms(squared: Any, log: Any) -> None:
+    """Fill log (S,) with ln J = 1/2 ln(1 + t) = artanh z, z = t / (2 + t), from t = J^2 - 1.
 
-    With c = F^T F - I, tr c and J^2 - 1 = tr c + (sum of principal minors of c) + det c carry the same rounding
-    errors, which cancel in mu (tr c / 2 - ln J); those of tr F^T F - 3 and ln det F would not.
+    A series with the same operations for all, so that several points are computed at once; `np.log1p` cannot be.
     """
-    c00, c11, c22, c01, c02, c12 = -1.0, -1.0, -1.0, 0.0, 0.0, 0.0
-    for k in range(3):
-        c00 += F[k, 0] * F[k, 0]
-        c11 += F[k, 1] * F[k, 1]
-        c22 += F[k, 2] * F[k, 2]
-        c01 += F[k, 0] * F[k, 1]
-        c02 += F[k, 0] * F[k, 2]
-        c12 += F[k, 1] * F[k, 2]
-    trace = c00 + c11 + c22
-    minors = c00 * c11 - c01 * c01 + c11 * c22 - c12 * c12 + c22 * c00 - c02 * c02
-    det = c00 * (c11 * c22 - c12 * c12) - c01 * (c01 * c22 - c12 * c02) + c02 * (c01 * c12 - c11 * c02)
-    log_j = 0.5 * np.log1p(trace + minors + det) if J > 0.5 else np.log(J)
-    return mu * (0.5 * trace - log_j) + 0.5 * lam * log_j * log_j
+    for s in range(log.shape[0]):
+        z = squared[s] / (2.0 + squared[s])
+        y = z * z
+        total = 1.0 / (2 * SERIES - 1)
+        for k in range(SERIES - 1):
+            total = total * y + 1.0 / (2 * (SERIES - 2 - k) + 1)
+        log[s] = z * total
 
 
 @compiled
-def beam_energy(x: Any, slots: Any, shape: Any, slope: Any, weight: Any, L: Any, mu: Any, lam: Any) -> float:
-    """Elastic energy, N mm; infinite where a section point has turned inside out.
+def _stretch_straight(d: Any, points: Any, half_trace: Any, squared: Any) -> None:
+    """Fill half_trace (S,) with (tr F^T F - 3) / 2 and squared (S,) with J^2 - 1 for a straight natural shape.
 
-    x (slots, 9); slots (M, n); shape (Q, n); slope (M, Q, n); weight (M, Q, S) volumes; L (1 or M, Q, S, 5, 3);
-    mu, lam (M, S).
+    d (5, 5) holds the products u_m . u_n less those of the natural shape. With c = F^T F - I, J^2 - 1 = tr c + (sum of
+    principal minors of c) + det c carries the same rounding errors as tr c. They cancel in tr c / 2 - ln J; those of
+    tr F^T F - 3 and det F would not.
     """
-    u, F = np.empty((N_STRAINS, 3)), np.empty((3, 3))
-    energy = 0.0
-    for e in range(slots.shape[0]):
-        block = e if L.shape[0] > 1 else 0
-        for q in range(shape.shape[0]):
-            _strains(slots[e], x, shape[q], slope[e, q], u)
-            for s in range(weight.shape[2]):
-                J = _deformation(u, L[block, q, s], F)
-                if not J > 0.0:
-                    return np.inf
-                energy += weight[e, q, s] * _density(F, J, mu[e, s], lam[e, s])
-    return energy
+    e00, e11, e01 = d[0, 0], d[1, 1], d[0, 1]
+    d02, d03, d04, d12, d13, d14 = d[0, 2], d[0, 3], d[0, 4], d[1, 2], d[1, 3], d[1, 4]
+    d22, d23, d24, d33, d34, d44 = d[2, 2], 2 * d[2, 3], 2 * d[2, 4], d[3, 3], 2 * d[3, 4], d[4, 4]
+    plane = e00 * e11 - e01 * e01
+    first, second = points[0], points[1]
+    for s in range(half_trace.shape[0]):
+        x, y = first[s], second[s]
+        e02 = d02 + x * d03 + y * d04
+        e12 = d12 + x * d13 + y * d14
+        e22 = d22 + x * (d23 + x * d33 + y * d34) + y * (d24 + y * d44)
+        trace = e00 + e11 + e22
+        minors = plane + e11 * e22 - e12 * e12 + e22 * e00 - e02 * e02
+        det = e22 * plane + e02 * (e01 * e12 - e11 * e02) + e12 * (e01 * e02 - e12 * e00)
+        half_trace[s] = 0.5 * trace
+        squared[s] = trace + minors + det
 
 
 @compiled
-def _point(u: Any, L: Any, w: float, mu: float, lam: float, F: Any, y: Any, g: Any, H: Any) -> float:
-    """Add one section point to g (5, 3) and H (5, 3, 5, 3); return its energy."""
-    J = _deformation(u, L, F)
-    if not J > 0.0:
-        return np.inf
-    _push(F, J, L, y)
-    pressure = w * (lam * np.log(J) - mu)
+def _stretch_curved(d: Any, points: Any, metric: Any, half_trace: Any, squared: Any, volume2: Any) -> None:
+    """The same where the natural shape has the metric G (S, 3, 3); fills also volume2 (S,) with det G.
+
+    With e = F^T F - G in the coordinates of the section and the axis, tr c = G^-1 : e, the minors' sum is
+    G : cof e / det G and det c = det e / det G.
+    """
+    e, cofactor = np.empty((3, 3)), np.empty((3, 3))
+    for s in range(half_trace.shape[0]):
+        x, y = points[0, s], points[1, s]
+        for a in range(2):
+            e[a, 2] = e[2, a] = d[a, 2] + x * d[a, 3] + y * d[a, 4]
+            for b in range(2):
+                e[a, b] = d[a, b]
+        e[2, 2] = d[2, 2] + 2 * (x * d[2, 3] + y * d[2, 4] + x * y * d[3, 4]) + x * x * d[3, 3] + y * y * d[4, 4]
+        G = metric[s]
+        trace = minors = det = volume2[s] = 0.0
+        for a in range(3):
+            a1, a2 = (a + 1) % 3, (a + 2) % 3
+            for b in range(3):
+                b1, b2 = (b + 1) % 3, (b + 2) % 3
+                cofactor[a, b] = e[a1, b1] * e[a2, b2] - e[a1, b2] * e[a2, b1]
+                own = G[a1, b1] * G[a2, b2] - G[a1, b2] * G[a2, b1]
+                trace += own * e[a, b]
+                minors += G[a, b] * cofactor[a, b]
+            det += e[0, a] * cofactor[0, a]
+            volume2[s] += G[0, a] * (G[1, a1] * G[2, a2] - G[1, a2] * G[2, a1])
+        half_trace[s] = 0.5 * trace / volume2[s]
+        squared[s] = (trace + minors + det) / volume2[s]
+
+
+@compiled
+def section(u: Any, normal: Any, natural: Any, metric: Any, points: Any, j: Any, work: Any) -> bool:
+    """State of all section points of one line point; False where one is inside out.
+
+    Fills j (3,) and the rows of work (4, S): tr c / 2, J^2 - 1, ln J, and the volume before the natural shape is
+    divided out. natural (5, 5); metric (S, 3, 3), or (0, 3, 3) for a straight natural shape; points (2, S).
+    """
+    d = np.empty((N_STRAINS, N_STRAINS))
     for m in range(N_STRAINS):
-        for c in range(3):
-            fl = 0.0
-            for j in range(3):
-                fl += F[c, j] * L[m, j]
-            g[m, c] += w * mu * fl + pressure * y[m, c]
         for n in range(N_STRAINS):
-            ll = w * mu * (L[m, 0] * L[n, 0] + L[m, 1] * L[n, 1] + L[m, 2] * L[n, 2])
-            for c in range(3):
-                H[m, c, n, c] += ll
-                for d in range(3):
-                    H[m, c, n, d] += w * lam * y[m, c] * y[n, d] - pressure * y[n, c] * y[m, d]
-    return w * _density(F, J, mu, lam)
+            d[m, n] = u[m, 0] * u[n, 0] + u[m, 1] * u[n, 1] + u[m, 2] * u[n, 2] - natural[m, n]
+    for i in range(3):
+        j[i] = u[2 + i, 0] * normal[0] + u[2 + i, 1] * normal[1] + u[2 + i, 2] * normal[2]
+    if metric.shape[0] > 0:
+        _stretch_curved(d, points, metric, work[0], work[1], work[3])
+    else:
+        _stretch_straight(d, points, work[0], work[1])
+        work[3] = 1.0
+    _logarithms(work[1], work[2])
+    for s in range(points.shape[1]):
+        J = j[0] + points[0, s] * j[1] + points[1, s] * j[2]
+        if not J > 0.0:
+            return False
+        ratio2 = J * J / work[3, s]
+        if not LEAST < ratio2 < LARGEST:
+            work[2, s] = 0.5 * np.log(ratio2)
+        work[3, s] = J
+    return True
 
 
 @compiled
-def beam_tangent(
-    x: Any, slots: Any, shape: Any, slope: Any, weight: Any, L: Any, mu: Any, lam: Any, gradient: Any, tangent: Any
-) -> float:
-    """Elastic energy; fills gradient (M, n, 9), N, and tangent (M, n, 9, n, 9), N/mm.
+def energy(weight: Any, mu: Any, lam: Any, work: Any) -> float:
+    """Sum of w (mu (tr c / 2 - ln J) + lambda/2 (ln J)^2) over the section points."""
+    total = 0.0
+    for s in range(weight.shape[0]):
+        log = work[2, s]
+        total += weight[s] * (mu[s] * (work[0, s] - log) + 0.5 * lam[s] * log * log)
+    return total
 
-    Arguments as `beam_energy`. Only blocks with a <= b are filled; the tangent is symmetric.
+
+@compiled
+def moments(weight: Any, points: Any, mu: Any, lam: Any, work: Any, p: Any, A: Any) -> None:
+    """Fill p (3,) and A (3, 3) with the section's moments of f' and f''."""
+    p0 = p1 = p2 = a00 = a01 = a02 = a11 = a12 = a22 = 0.0
+    for s in range(weight.shape[0]):
+        x, y, inverse = points[0, s], points[1, s], 1.0 / work[3, s]
+        slope = lam[s] * work[2, s] - mu[s]
+        first = weight[s] * slope * inverse
+        second = weight[s] * (lam[s] - slope) * inverse * inverse
+        p0 += first
+        p1 += first * x
+        p2 += first * y
+        a00 += second
+        a01 += second * x
+        a02 += second * y
+        a11 += second * x * x
+        a12 += second * x * y
+        a22 += second * y * y
+    p[0], p[1], p[2] = p0, p1, p2
+    A[0, 0], A[1, 1], A[2, 2] = a00, a11, a22
+    A[0, 1] = A[1, 0] = a01
+    A[0, 2] = A[2, 0] = a02
+    A[1, 2] = A[2, 1] = a12
+
+
+@compiled
+def beam_energy(
+    first: int,
+    last: int,
+    x: Any,
+    slots: Any,
+    shape: Any,
+    slope: Any,
+    weight: Any,
+    points: Any,
+    natural: Any,
+    metric: Any,
+    mu: Any,
+    lam: Any,
+    out: Any,
+) -> None:
+    """Fill out (M,) with the elastic energy, N mm, of elements first to last; infinite where one is inside out.
+
+    x (slots, 9); slots (M, n); shape, slope (M, Q, n); weight (M, Q, S) volumes; points (1 or M, 2, S); natural
+    (1 or M, Q, 5, 5); metric (1, Q, 0, 3, 3) or (M, Q, S, 3, 3); mu, lam (M, S).
     """
-    nodes = slots.shape[1]
-    u, F, y = np.empty((N_STRAINS, 3)), np.empty((3, 3)), np.empty((N_STRAINS, 3))
-    g, H = np.empty((N_STRAINS, 3)), np.empty((N_STRAINS, 3, N_STRAINS, 3))
-    # u_m gets shape or slope times unknown block m_block[m] of each node: r -> r'; g1 -> g1, g1'; g2 -> g2, g2'
-    phi = np.empty((nodes, N_STRAINS))
-    unknown = np.array([1, 2, 0, 1, 2])
-    energy = 0.0
-    gradient[:] = 0.0
-    tangent[:] = 0.0
-    for e in range(slots.shape[0]):
-        block = e if L.shape[0] > 1 else 0
-        for q in range(shape.shape[0]):
-            _strains(slots[e], x, shape[q], slope[e, q], u)
-            g[:] = 0.0
-            H[:] = 0.0
-            for s in range(weight.shape[2]):
-                energy += _point(u, L[block, q, s], weight[e, q, s], mu[e, s], lam[e, s], F, y, g, H)
-            for a in range(nodes):
-                phi[a, 0] = phi[a, 1] = shape[q, a]
-                phi[a, 2] = phi[a, 3] = phi[a, 4] = slope[e, q, a]
-            for a in range(nodes):
-                for m in range(N_STRAINS):
-                    row = 3 * unknown[m]
-                    for c in range(3):
-                        gradient[e, a, row + c] += phi[a, m] * g[m, c]
-                    for b in range(a, nodes):
-                        for n in range(N_STRAINS):
-                            col, factor = 3 * unknown[n], phi[a, m] * phi[b, n]
-                            for c in range(3):
-                                for d in range(3):
-                                    tangent[e, a, row + c, b, col + d] += factor * H[m, c, n, d]
-    return energy
+    u, normal, j, work = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, weight.shape[2]))
+    for e in range(first, last):
+        block, shaped = min(e, points.shape[0] - 1), min(e, natural.shape[0] - 1)
+        out[e] = 0.0
+        for q in range(shape.shape[1]):
+            strains(slots[e], x, shape[e, q], slope[e, q], u, normal)
+            if section(u, normal, natural[shaped, q], metric[shaped, q], points[block], j, work):
+                out[e] += energy(weight[e, q], mu[e], lam[e], work)
+            else:
+                out[e] = np.inf
 
 
 @compiled
-def section_force(x: Any, slots: Any, shape: Any, slope: Any, area: Any, L: Any, mu: Any, lam: Any, force: Any) -> None:
-    """Fill force (M, Q, 3) with the section force dE/dr' = ∫ P E3 dA, N; area (M, Q, S) section weights, mm2."""
-    u, F, y = np.empty((N_STRAINS, 3)), np.empty((3, 3)), np.empty((N_STRAINS, 3))
-    g, H = np.empty((N_STRAINS, 3)), np.empty((N_STRAINS, 3, N_STRAINS, 3))
-    for e in range(slots.shape[0]):
-        block = e if L.shape[0] > 1 else 0
-        for q in range(shape.shape[0]):
-            _strains(slots[e], x, shape[q], slope[e, q], u)
-            g[:] = 0.0
-            for s in range(area.shape[2]):
-                _point(u, L[block, q, s], area[e, q, s], mu[e, s], lam[e, s], F, y, g, H)
-            for c in range(3):  # assigning the row would cost numba 4 s more to compile
-                force[e, q, c] = g[2, c]
+def section_force(
+    first: int,
+    last: int,
+    x: Any,
+    slots: Any,
+    shape: Any,
+    slope: Any,
+    area: Any,
+    points: Any,
+    natural: Any,
+    metric: Any,
+    mu: Any,
+    lam: Any,
+    quadratic: Any,
+    force: Any,
+) -> None:
+    """Fill force (M, Q, 3) with the section force dE/dr' = ∫ P E3 dA, N; area (M, Q, S) section weights, mm2.
+
+    quadratic (M, Q, 5, 5): the part of it that is linear in u.
+    """
+    u, normal, j, work = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, area.shape[2]))
+    p, A = np.empty(3), np.empty((3, 3))
+    for e in range(first, last):
+        block, shaped = min(e, points.shape[0] - 1), min(e, natural.shape[0] - 1)
+        for q in range(shape.shape[1]):
+            strains(slots[e], x, shape[e, q], slope[e, q], u, normal)
+            section(u, normal, natural[shaped, q], metric[shaped, q], points[block], j, work)
+            moments(area[e, q], points[block], mu[e], lam[e], work, p, A)
+            for c in range(3):
+                force[e, q, c] = p[0] * normal[c]
+                for m in range(N_STRAINS):
+                    force[e, q, c] += quadratic[e, q, 2, m] * u[m, c]

@@ -1,0 +1,185 @@
+"""Gradient and tangent of beam elements, added straight to the vector and the sparse matrix.
+
+The second derivative of the elastic energy has three parts (see `kernels`): a constant one, the same for the three
+components; the second derivatives of the volume ratio's coefficients j_i, which couple two nodes by a cross product
+with a vector; and the products of their first derivatives, of rank three at each line point. Rows of a node are
+computed from the last part, as wide as a vector register's multiple, and the others are added on the way into the
+matrix. Elements of different fibrils share no node and no entry, so they can be added at the same time.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from circuittex.compiled import compiled
+from circuittex.mech.kernels import N_STRAINS, energy, moments, section, strains
+from circuittex.mech.pattern import find_neighbour
+
+WIDTH = 32
+"""Length of a row of the 27 unknowns of a quadratic element, filled up."""
+RANK = 6
+"""Three coefficients j_i at each of two line points at most."""
+
+
+@compiled
+def _volume_slopes(u: Any, normal: Any, shape: Any, slope: Any, V: Any) -> None:
+    """Fill V (3, WIDTH) with the derivatives of j_i = (g1 x g2) . u_(2+i) by the element's unknowns."""
+    for i in range(3):
+        for c in range(3):
+            c1, c2 = (c + 1) % 3, (c + 2) % 3
+            by_g1 = u[1, c1] * u[2 + i, c2] - u[1, c2] * u[2 + i, c1]
+            by_g2 = u[2 + i, c1] * u[0, c2] - u[2 + i, c2] * u[0, c1]
+            for a in range(shape.shape[0]):
+                V[i, 9 * a + c] = 0.0
+                V[i, 9 * a + 3 + c] = shape[a] * by_g1
+                V[i, 9 * a + 6 + c] = shape[a] * by_g2
+                V[i, 9 * a + 3 * i + c] += slope[a] * normal[c]
+
+
+@compiled
+def _turn(u: Any, shape: Any, slope: Any, p: Any, C: Any) -> None:
+    """Add sum_i p_i d2j_i to C (3 n, 3 n, 3): the block of the vectors k and l is epsilon_cde C[k, l, e].
+
+    j_i = g1 . (g2 x u_(2+i)): the pairs (g1, g2), (u, g1) and (g2, u) give u, g2 and g1. Node a <= node b only.
+    """
+    for a in range(shape.shape[0]):
+        for b in range(a, shape.shape[0]):
+            both, left, right = shape[a] * shape[b], slope[a] * shape[b], shape[a] * slope[b]
+            for e in range(3):
+                g1, g2 = u[0, e], u[1, e]
+                v = both * (p[0] * u[2, e] + p[1] * u[3, e] + p[2] * u[4, e])
+                C[3 * a, 3 * b + 1, e] += left * p[0] * g2
+                C[3 * a, 3 * b + 2, e] -= left * p[0] * g1
+                C[3 * a + 1, 3 * b, e] -= right * p[0] * g2
+                C[3 * a + 2, 3 * b, e] += right * p[0] * g1
+                C[3 * a + 1, 3 * b + 1, e] += (left - right) * p[1] * g2
+                C[3 * a + 2, 3 * b + 2, e] += (right - left) * p[2] * g1
+                C[3 * a + 1, 3 * b + 2, e] += v - right * p[2] * g2 - left * p[1] * g1
+                C[3 * a + 2, 3 * b + 1, e] -= v - left * p[2] * g2 - right * p[1] * g1
+
+
+@compiled
+def _spread(stiffness: Any, C: Any, K: Any) -> None:
+    """Fill the upper triangle of K (9 n, WIDTH) with the constant stiffness and the cross products."""
+    for k in range(stiffness.shape[0]):
+        x, y, z = K[3 * k], K[3 * k + 1], K[3 * k + 2]
+        for m in range(3 * (k // 3), stiffness.shape[0]):
+            at, same, c0, c1, c2 = 3 * m, stiffness[k, m], C[k, m, 0], C[k, m, 1], C[k, m, 2]
+            x[at], x[at + 1], x[at + 2] = same, c2, -c1
+            y[at], y[at + 1], y[at + 2] = -c2, same, c0
+            z[at], z[at + 1], z[at + 2] = c1, -c0, same
+
+
+@compiled
+def _weighted(p: Any, A: Any, V: Any, W: Any, g: Any) -> None:
+    """Fill W (3, WIDTH) with A V and add p V to the gradient g (WIDTH,)."""
+    p0, p1, p2, v0, v1, v2 = p[0], p[1], p[2], V[0], V[1], V[2]
+    for m in range(WIDTH):
+        g[m] += p0 * v0[m] + p1 * v1[m] + p2 * v2[m]
+    for i in range(3):
+        row, a0, a1, a2 = W[i], A[i, 0], A[i, 1], A[i, 2]
+        for m in range(WIDTH):
+            row[m] = a0 * v0[m] + a1 * v1[m] + a2 * v2[m]
+
+
+@compiled
+def _products(V: Any, W: Any, K: Any) -> None:
+    """Add W^T V to K (9 n, WIDTH)."""
+    v0, v1, v2, v3, v4, v5 = V[0], V[1], V[2], V[3], V[4], V[5]
+    for k in range(K.shape[0]):
+        row = K[k]
+        w0, w1, w2, w3, w4, w5 = W[0, k], W[1, k], W[2, k], W[3, k], W[4, k], W[5, k]
+        for m in range(WIDTH):
+            row[m] += w0 * v0[m] + w1 * v1[m] + w2 * v2[m] + w3 * v3[m] + w4 * v4[m] + w5 * v5[m]
+
+
+@compiled
+def _add_gradient(slots: Any, x: Any, stiffness: Any, g: Any, total: Any) -> None:
+    """Add the element's gradient, that of the constant stiffness (3 n, 3 n) included, to total (n_dofs,)."""
+    for k in range(stiffness.shape[0]):
+        t0, t1, t2 = g[3 * k], g[3 * k + 1], g[3 * k + 2]
+        for j in range(slots.shape[0]):
+            row = x[slots[j]]
+            for m in range(3):
+                factor = stiffness[k, 3 * j + m]
+                t0 += factor * row[3 * m]
+                t1 += factor * row[3 * m + 1]
+                t2 += factor * row[3 * m + 2]
+        at = 9 * slots[k // 3] + 3 * (k % 3)
+        total[at] += t0
+        total[at + 1] += t1
+        total[at + 2] += t2
+
+
+@compiled
+def _add_tangent(
+    slots: Any, K: Any, indptr: Any, start: Any, neighbour: Any, point_offset: Any, full_offset: Any, data: Any
+) -> None:
+    """Add the upper triangle of the element's tangent K (9 n, WIDTH) to the matrix values."""
+    for i in range(slots.shape[0]):
+        for r in range(9):
+            at, row = indptr[9 * slots[i] + r] - r, K[9 * i + r]
+            for m in range(r, 9):
+                data[at + m] += row[9 * i + m]
+        for j in range(i + 1, slots.shape[0]):
+            n = find_neighbour(start, neighbour, slots[i], slots[j])
+            for r in range(9):
+                at, row = indptr[9 * slots[i] + r] + 9 - r, K[9 * i + r]
+                at += point_offset[n] if r < 3 else full_offset[n]
+                for m in range(9):
+                    data[at + m] += row[9 * j + m]
+
+
+@compiled
+def add_tangent(
+    first: int,
+    last: int,
+    x: Any,
+    slots: Any,
+    shape: Any,
+    slope: Any,
+    weight: Any,
+    points: Any,
+    natural: Any,
+    metric: Any,
+    mu: Any,
+    lam: Any,
+    stiffness: Any,
+    out: Any,
+    indptr: Any,
+    start: Any,
+    neighbour: Any,
+    point_offset: Any,
+    full_offset: Any,
+    total: Any,
+    data: Any,
+) -> None:
+    """Add gradient (n_dofs,), N, and tangent (nnz,), N/mm, of elements first to last; fill out (M,) with energies.
+
+    Arguments as `beam_energy`, the slots of an element in ascending order; stiffness (M, 3 n, 3 n).
+    """
+    u, normal, j, work = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, weight.shape[2]))
+    p, A = np.empty(3), np.empty((3, 3))
+    V, W = np.zeros((RANK, WIDTH)), np.zeros((RANK, WIDTH))
+    vectors = stiffness.shape[1]
+    C, K, g = np.empty((vectors, vectors, 3)), np.zeros((3 * vectors, WIDTH)), np.empty(WIDTH)
+    for e in range(first, last):
+        block, shaped = min(e, points.shape[0] - 1), min(e, natural.shape[0] - 1)
+        out[e], g[:], C[:] = 0.0, 0.0, 0.0
+        for q in range(shape.shape[1]):
+            strains(slots[e], x, shape[e, q], slope[e, q], u, normal)
+            if not section(u, normal, natural[shaped, q], metric[shaped, q], points[block], j, work):
+                out[e] = np.inf
+                continue
+            out[e] += energy(weight[e, q], mu[e], lam[e], work)
+            moments(weight[e, q], points[block], mu[e], lam[e], work, p, A)
+            here = slice(3 * q, 3 * q + 3)
+            _volume_slopes(u, normal, shape[e, q], slope[e, q], V[here])
+            _weighted(p, A, V[here], W[here], g)
+            _turn(u, shape[e, q], slope[e, q], p, C)
+        _spread(stiffness[e], C, K)
+        _products(V, W, K)
+        _add_gradient(slots[e], x, stiffness[e], g, total)
+        _add_tangent(slots[e], K, indptr, start, neighbour, point_offset, full_offset, data)

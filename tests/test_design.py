@@ -8,6 +8,7 @@ import pickle
 import subprocess
 import sys
 import tomllib
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -83,6 +84,15 @@ def test_examples_and_python_agree(file: str, parameters: str) -> None:
     from_python = plain_weave(parameters, loading=(uniaxial("stretch", equal_steps(0.1, 4)),))
     assert same(from_file, from_python)
     assert design_hash(from_file) == design_hash(from_python)
+
+
+@pytest.mark.parametrize(("file", "parameters"), [("paper.toml", "paper-code"), ("paper_table.toml", "paper-table")])
+def test_the_papers_study_is_both_loadings_to_a_quarter(file: str, parameters: str) -> None:
+    strains = tuple(Fraction(25, 1000) * step for step in range(1, 11))
+    loading = (uniaxial("stretch", list(map(float, strains))), shear("shear", list(map(float, strains))))
+    design = load_design(EXAMPLES / file)
+    assert same(design, dataclasses.replace(plain_weave(parameters, loading=loading), name=design.name))
+    assert parameters in design.name
 
 
 def test_the_starter_states_the_defaults_and_the_first_example() -> None:

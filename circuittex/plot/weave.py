@@ -50,7 +50,7 @@ def _force_figure(study: Study, records: Sequence[Record], pixels: int) -> Figur
     rows = -(-len(records) // columns)
     panels = []
     with style():
-        figure = new_figure(7.2 if columns == 1 else 5.6 * columns, 5.0 * rows)
+        figure = new_figure(7.2 if columns == 1 else 5.6 * columns, 4.4 * rows + 0.6)
         for number, record in enumerate(records):
             axes = figure.add_subplot(rows, columns, number + 1)
             values = record.section_force[tubes.span_element(study.mesh)]
@@ -74,7 +74,7 @@ def probe_figure(study: Study, records: Sequence[Record], quantity: str) -> Figu
     view = camera(*PROBE_VIEW)
     columns, panels = len(study.design.probes), []
     with style():
-        figure = new_figure(3.6 * columns, 3.9 * len(records))
+        figure = new_figure(3.6 * columns, 3.5 * len(records))
         # The layout counts the height of one line of a title above axes of a fixed aspect; these have two.
         figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1.0 - 0.06 / len(records)), hspace=0.06)
         for row, record in enumerate(records):

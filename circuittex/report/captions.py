@@ -24,7 +24,7 @@ _CAPTIONS = {
     "circuit: largest relative error of a probe current in the relaxed state.",
 }
 _FIGURES_OF_THE_PAPER = {
-    "cell": "9, right",
+    "cell": "9 (right)",
     "section": "10",
     "forces": "11",
     "strained": "12",

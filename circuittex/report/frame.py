@@ -28,7 +28,7 @@ tbody th { font-weight: 500; white-space: nowrap; }
 .good, .bad { padding: .2rem 1rem; border-left: .4rem solid #009e73; background: #eef8f4; }
 .bad { border-color: #d55e00; background: #fdf1e8; font-weight: 600; }
 .claims th, .claims td { text-align: left; vertical-align: top; min-width: 11rem; }
-.claims tbody th { white-space: normal; max-width: 24rem; }
+.claims tbody th { white-space: normal; min-width: 19rem; }
 .claims small { display: block; margin-top: .25rem; font-weight: 400; color: #555; }
 em { display: inline-block; margin-right: .3rem; padding: 0 .4rem; border-radius: .3rem; font-style: normal;
   font-weight: 600; background: #eee; }

@@ -64,10 +64,8 @@ class Beam:
 
     def _quadratic(self) -> Floats:
         """(M, Q, 5, 5) mu/2 tr F^T F dA = 1/2 u.C u: the matrices C, N."""
-        if self.metric.shape[2] == 0:
-            inverse = np.eye(3) * np.ones((*self.area.shape, 1, 1))
-        else:
-            inverse = np.linalg.inv(self.metric)
+        straight = self.metric.shape[2] == 0
+        inverse = np.eye(3) * np.ones((*self.area.shape, 1, 1)) if straight else np.linalg.inv(self.metric)
         x, y = self.points[:, 0], self.points[:, 1]
         to_columns = np.zeros((*x.shape, 3, N_STRAINS))  # F = u^T to_columns^T
         to_columns[..., [0, 1, 2], [0, 1, 2]] = 1.0

@@ -9,7 +9,7 @@ PYTEST_ARGS ?= -n auto
 PY := $(VENV)/bin/python
 export VENV PYTHON
 
-.PHONY: run test lint style types docs clean ngspice help
+.PHONY: run paper test lint style types docs clean ngspice help
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -17,6 +17,11 @@ help: ## list the targets
 
 run: $(VENV)/.ready ngspice ## compute DESIGN (the plain weave of the paper) into OUT
 	$(PY) -m circuittex run $(DESIGN) --out $(OUT)
+
+paper: $(VENV)/.ready ngspice ## the whole study of the paper for both parameter sets, and one report of both
+	$(PY) -m circuittex run examples/paper.toml --out results/paper
+	$(PY) -m circuittex run examples/paper_table.toml --out results/paper_table
+	$(PY) -m circuittex report results/paper --beside results/paper_table
 
 test: $(VENV)/.ready ngspice ## run the whole test suite
 	$(PY) -m pytest $(PYTEST_ARGS)

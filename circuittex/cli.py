@@ -151,9 +151,24 @@ def _report(options: argparse.Namespace) -> int:
     from circuittex.report import write_report
     from circuittex.summary import write_summary
 
+    beside = _beside(options, study)
     write_summary(folder / "summary.json", study)
-    print(write_report(folder, study))
+    print(write_report(folder, study, beside))
     return 0
+
+
+def _beside(options: argparse.Namespace, study: Study) -> tuple[Study, ...]:
+    """The study that shares the table of claims with `study`; both must be of the paper's cell."""
+    if options.beside is None:
+        return ()
+    from circuittex.claims import parameter_set
+
+    other = _load(options.beside)
+    for path, one in ((options.results, study), (options.beside, other)):
+        if parameter_set(one.design) is None:
+            allowed = f"{path} must be a study of the paper's cell: only of that there are claims to compare"
+            raise DesignError("--beside", str(options.beside), allowed)
+    return (other,)
 
 
 COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {

@@ -138,6 +138,13 @@ def _add_report(commands: Commands) -> None:
         "circuittex report results/plain_weave",
     )
     _add_results(parser)
+    parser.add_argument(
+        "--beside",
+        metavar="OTHER",
+        type=Path,
+        help="results of the paper's cell with the other parameter set: they get a column of their own in the table "
+        "that compares the paper's claims with what is found",
+    )
 
 
 def _add_results(parser: argparse.ArgumentParser) -> None:

@@ -198,6 +198,7 @@ def _parameters(study: Study) -> str:
         _settings("Contact", design.contact),
         _settings("Electrical", design.electrical),
         _settings("Numerics", design.numerics),
+        _loading(study),
         "<h3>Probes</h3>",
         _table(
             ["probe", "source", "sink", "voltage (V)"],
@@ -205,6 +206,23 @@ def _parameters(study: Study) -> str:
         ),
     ]
     return "".join(parts)
+
+
+def _loading(study: Study) -> str:
+    if not study.design.loading:
+        return ""
+    head = ["path", "states", "strain", "last average deformation gradient", "ends let go"]
+    rows = [
+        [
+            path.name,
+            str(len(path.strains)),
+            f"{min(path.strains):g} to {max(path.strains):g}",
+            ", ".join(f"F{i}{j} {path.gradients[-1][a][b]:g}" for a, i in enumerate("xy") for b, j in enumerate("xy")),
+            f"yarns along {path.free}" if path.free else "none",
+        ]
+        for path in study.design.loading
+    ]
+    return f"<h3>Loading</h3>{_table(head, rows)}"
 
 
 def _ends(study: Study, name: str) -> str:

@@ -12,6 +12,8 @@ import pytest
 from synthetic_study import synthetic_study
 from test_summary import disagreeing, unchecked
 
+from circuittex.claims import CLAIMS
+from circuittex.design import uniaxial
 from circuittex.plot import FIGURES
 from circuittex.report import page, write_report
 from circuittex.results import Study
@@ -103,6 +105,32 @@ def test_disagreement_is_said_plainly(difference: float) -> None:
     text = page(replace(STUDY, records=(*STUDY.records, wrong)), {})
     assert "DISAGREE" in text
     assert 'class="bad"' in text
+
+
+def test_the_paper_is_judged_where_the_study_is_of_its_cell() -> None:
+    shown = parsed(STUDY)
+    assert all(claim.states in shown.text for claim in CLAIMS)
+    assert "Figure 15 of the paper." in page(STUDY, {"network": PNG})
+    weave = replace(STUDY.design.weave, amplitude=0.5)
+    other = page(replace(STUDY, design=replace(STUDY.design, weave=weave)), {"network": PNG})
+    assert "of the paper" not in other
+    assert "claim by claim" not in other
+
+
+def test_findings_that_differ_are_followed_by_the_reason() -> None:
+    slack = tuple(replace(record, clamp_force=0.1 * record.clamp_force) for record in STUDY.records)
+    text = page(replace(STUDY, records=slack), {})
+    assert '<em class="no">does not agree</em> 0.149 N on the warp' in text
+    assert "Why not: With Table I" in text
+    fit = tuple(replace(record, clamp_force=record.clamp_force * 2.0 / 1.49) for record in STUDY.records)
+    assert "Why not: With Table I" not in page(replace(STUDY, records=fit), {})
+
+
+def test_loading_paths_are_stated() -> None:
+    loading = (uniaxial("strip", (0.1, 0.2, 0.1), free="y"),)
+    text = parsed(replace(STUDY, design=replace(STUDY.design, loading=loading))).text
+    row = text.index("strip")
+    assert text[row : row + 5] == ["strip", "3", "0.1 to 0.2", "Fxx 1.1, Fxy 0, Fyx 0, Fyy 1", "yarns along y"]
 
 
 def test_study_without_states(tmp_path: Path) -> None:

@@ -56,7 +56,8 @@ def advance(
     while True:
         target = after if done + size == 1 else before + float(done + size) * (after - before)
         try:
-            equilibrium = relax(mesh, design, move(now, gradient, target), free=free, solver=solver, report=report)
+            start = move(now, gradient, target)
+            equilibrium = relax(mesh, design, start, before=now, free=free, solver=solver, report=report)
         except ConvergenceError as error:
             iterations += len(error.history) - 1
             if size == SMALLEST:

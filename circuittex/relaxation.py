@@ -8,11 +8,11 @@ import numpy as np
 
 from circuittex.contact.penalty import PenaltyContact
 from circuittex.design import Design
-from circuittex.frozen import frozen
+from circuittex.frozen import frozen, same
 from circuittex.geometry.mesh import FibrilMesh, Floats
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
-from circuittex.mech.equilibrium import minimise
+from circuittex.mech.equilibrium import minimise, predict
 from circuittex.mech.linear import LinearSolver, best_solver
 from circuittex.mech.space import BeamSpace, beam_space
 
@@ -31,9 +31,9 @@ class Equilibrium:
     residual: float
     """Largest free-dof force, N."""
     iterations: int
-    """Newton iterations."""
+    """Linear systems solved: Newton iterations, and one for the prediction where there was one."""
     history: Floats
-    """(iterations + 1, 4) residual N, potential N mm, shift N/(mm g), step length."""
+    """(Newton iterations + 1, 4) residual N, potential N mm, shift N/(mm g), step length."""
 
 
 def force_terms(mesh: FibrilMesh, design: Design, free: str = "") -> tuple[BeamSpace, Beam, PenaltyContact]:
@@ -50,23 +50,30 @@ def relax(
     design: Design,
     start: Configuration | None = None,
     *,
+    before: Configuration | None = None,
     free: str = "",
     solver: LinearSolver | None = None,
     report: Callable[[int, float], None] | None = None,
 ) -> Equilibrium:
     """The equilibrium that descent from `start` (by default the initial weave) reaches, ends held as there.
 
-    The ends of yarns along `free`, 'x' or 'y', are not held.
+    Where `start` was moved from the equilibrium `before`, the first step takes the tangent of that (`predict`). The
+    ends of yarns along `free`, 'x' or 'y', are not held.
 
     Raises `ConvergenceError` with the history where it is not reached.
     """
     space, beam, contact = force_terms(mesh, design, free)
+    solver = solver if solver is not None else best_solver()
+    start = start if start is not None else initial_configuration(mesh)
+    q, moved = space.vector(start), before is not None and not same(before, start)
+    if before is not None and moved:
+        q = predict([beam, contact], space.vector(before), q, mass=beam.mass, fixed=space.fixed, solver=solver)
     minimum = minimise(
         [beam, contact],
-        space.vector(start if start is not None else initial_configuration(mesh)),
+        q,
         mass=beam.mass,
         fixed=space.fixed,
-        solver=solver if solver is not None else best_solver(),
+        solver=solver,
         tolerance=design.numerics.tolerance,
         max_iterations=design.numerics.max_iterations,
         report=report,
@@ -77,7 +84,7 @@ def relax(
         section_force=beam.section_force(minimum.q),
         energy=minimum.energy,
         residual=minimum.residual,
-        iterations=minimum.iterations,
+        iterations=minimum.iterations + moved,
         history=minimum.history,
     )
 

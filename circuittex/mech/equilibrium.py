@@ -108,6 +108,31 @@ class _System:
         return sum(term.energy(q) for term in self.terms)
 
 
+def predict(
+    terms: Sequence[ForceTerm],
+    q: Floats,
+    moved: Floats,
+    *,
+    mass: Callable[[Pattern], Floats],
+    fixed: Ints,
+    solver: LinearSolver,
+) -> Floats:
+    """Where a minimum q (n_dofs,) goes to first order when its prescribed unknowns move to those of `moved`.
+
+    With the tangent K at q and the free unknowns f, the minimum moves by dq with (K dq)_f = 0; this is solved for the
+    difference to `moved`, a first guess. `moved` itself is returned where its potential is the lower one.
+    """
+    system = _System(terms, mass, fixed, len(q))
+    pattern, _, _ = system.assemble(q)
+    force = multiply(pattern, system.data + system.softening, moved - q)
+    force[fixed] = 0.0
+    solve = system.factor(solver, FIRST_SHIFT, 1.0)
+    if solve is None:
+        return moved
+    predicted = moved - solve(force)
+    return predicted if system.energy(predicted) < system.energy(moved) else moved
+
+
 def minimise(
     terms: Sequence[ForceTerm],
     q: Floats,
@@ -128,7 +153,7 @@ def minimise(
     unconverged state is never returned.
     """
     system = _System(terms, mass, fixed, len(q))
-    shift, part, step, history = FIRST_SHIFT, 0, 1.0, []
+    shift, part, refused, step, history = FIRST_SHIFT, 0, False, 1.0, []
     free = np.ones(len(q), dtype=bool)
     free[fixed] = False
     for iteration in range(max_iterations + 1):
@@ -147,8 +172,9 @@ def minimise(
         if iteration == max_iterations:
             break
         rough = residual > ROUGH * np.abs(gradient).max()
-        parts = SOFTENING[max(0, part - 1) :] if rough else SOFTENING[:1]
+        parts = SOFTENING[part if refused or part == 0 else part - 1 :] if rough else SOFTENING[:1]
         shift, part, solve = _positive(system, solver, shift, parts, history)
+        refused = SOFTENING[part] != parts[0]
         if shift > FIRST_SHIFT and residual < SADDLE * np.abs(gradient).max():
             lower = _escape(system, pattern, solve, q, energy, free)
             if lower is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
@@ -19,8 +20,8 @@ from circuittex.mech.section import disk_rule
 from circuittex.mech.space import DOFS, BeamSpace
 from circuittex.mech.tangent import add_tangent
 
-PIECES = 16
-"""Fibrils are assembled in this many pieces, whatever the number of threads."""
+WORTH_A_THREAD = 200
+"""Elements whose assembly takes several times as long as it takes to start a thread."""
 
 
 class Beam:
@@ -101,18 +102,18 @@ class Beam:
         return q.reshape(-1, DOFS), *tables
 
     def _by_fibrils(self, kernel: Callable[..., object], *arguments: Any) -> None:
-        """Call a kernel for the elements of all fibrils, in pieces on all cores.
+        """Call a kernel for the elements of all fibrils, in as many pieces as there are cores.
 
-        Fibrils share no node: each piece has entries of its own, and the result does not depend on their number.
+        Fibrils share no node: each piece has entries of its own, and no bit of the result depends on their number.
         """
         first = self.space.mesh.first_element
-        edges = np.unique(first[np.linspace(0, len(first) - 1, PIECES + 1).astype(int)]).tolist()
-        pieces = list(pairwise(edges))
-        if len(pieces) == 1:
-            kernel(*pieces[0], *arguments)
+        pieces = min(cores(), 1 + int(first[-1]) // WORTH_A_THREAD)
+        edges = np.unique(first[np.linspace(0, len(first) - 1, pieces + 1).astype(int)]).tolist()
+        if len(edges) == 2:
+            kernel(*edges, *arguments)
             return
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            list(pool.map(lambda piece: kernel(*piece, *arguments), pieces))
+        with ThreadPoolExecutor(len(edges) - 1) as pool:
+            list(pool.map(lambda piece: kernel(*piece, *arguments), pairwise(edges)))
 
     def energy(self, q: Floats) -> float:
         """Elastic energy, N mm; infinite where a section has turned inside out."""
@@ -167,6 +168,11 @@ class Beam:
             data,
         )
         return data
+
+
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 def _straight(space: BeamSpace) -> tuple[Floats, Floats]:

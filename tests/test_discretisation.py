@@ -6,7 +6,7 @@ from math import inf, isnan, nan
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from circuittex.discretisation import ErrorEstimate, QuantityError, contact_error, mesh_error, observed_order
@@ -44,6 +44,7 @@ def test_values_on_alternating_sides_are_bounded(limit: float, size: float, orde
 
 
 @given(limits, sizes, st.floats(-3.0, 3.0))
+@example(0.0, 1.0, -0.78)  # the two finer values nearly agree, by chance and far from the limit
 def test_second_order_with_a_large_next_term_is_bounded(limit: float, size: float, next_term: float) -> None:
     """e = h² + b h⁴ as far from its leading term as a coarse mesh may be, whatever the sequence looks like."""
     coarse, middle, fine = (limit + size * (h**2 + next_term * h**4) for h in (2.0, 1.0, 0.5))

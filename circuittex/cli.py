@@ -65,7 +65,13 @@ def _run(options: argparse.Namespace) -> int:
         from circuittex.study import run_study
         from circuittex.summary import table
 
-        study = run_study(design, options.out, progress=progress)
+        study = run_study(
+            design,
+            options.out,
+            fresh=options.fresh,
+            workers=options.workers,
+            progress=progress,
+        )
     if not options.quiet:
         print(table(study))
         print(f"\nreport: {options.out / 'report.html'}")
@@ -145,15 +151,17 @@ def _verify(options: argparse.Namespace) -> int:
 
 
 def _report(options: argparse.Namespace) -> int:
-    study = _load(options.results)
-    folder = options.results if options.results.is_dir() else options.results.parent
+    folder = _results_file(options.results).parent
     _prepare(folder)
+    from circuittex.lock import locked
     from circuittex.report import write_report
     from circuittex.summary import write_summary
 
-    beside = _beside(options, study)
-    write_summary(folder / "summary.json", study)
-    print(write_report(folder, study, beside))
+    with locked(folder):
+        study = _load(options.results)
+        beside = _beside(options, study)
+        write_summary(folder / "summary.json", study)
+        print(write_report(folder, study, beside))
     return 0
 
 
@@ -181,7 +189,10 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
 
 
 class Progress:
-    """Shows what is being done: one updating line on a terminal, plain lines elsewhere."""
+    """Shows what is being done: one updating line on a terminal, plain lines elsewhere.
+
+    A text that ends with a line break stays on the terminal.
+    """
 
     def __init__(self, stream: TextIO, *, show: bool = True) -> None:
         self._stream, self._show = stream, show
@@ -191,11 +202,12 @@ class Progress:
         """Show `text`, which is one line."""
         if not self._show:
             return
-        if self._updating:
+        if text.endswith("\n") or not self._updating:
+            start = "\r\x1b[2K" if self._updating else ""
+            self._stream.write(f"{start}{text.rstrip()}\n")
+        else:
             width = shutil.get_terminal_size().columns - 1
             self._stream.write(f"\r\x1b[2K{text[:width]}")
-        else:
-            self._stream.write(f"{text}\n")
         self._stream.flush()
 
     def __enter__(self) -> Progress:
@@ -224,7 +236,15 @@ def _load(path: Path) -> Study:
     """The study in a results folder, or in an HDF5 file given by its own name."""
     from circuittex.store import load_study
 
-    return load_study(path / RESULTS if path.is_dir() else path)
+    return load_study(_results_file(path))
+
+
+def _results_file(path: Path) -> Path:
+    """The HDF5 file that is meant by itself or by its folder."""
+    file = path / RESULTS if path.is_dir() else path
+    if not file.is_file():
+        raise StoreError(f"{file}: there is no results file here")
+    return file
 
 
 def _select(study: Study, name: str | None) -> tuple[Record, ...]:
@@ -247,4 +267,4 @@ def _kept(options: argparse.Namespace) -> str:
     if count == 0:
         return "no state was finished"
     states = "1 finished state is" if count == 1 else f"{count} finished states are"
-    return f"{states} kept in {options.out / RESULTS}"
+    return f"{states} kept in {options.out / RESULTS}; the same command goes on from there"

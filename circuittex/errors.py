@@ -16,6 +16,9 @@ class DesignError(CircuittexError, ValueError):
         self.field, self.value, self.allowed = field, value, allowed
         super().__init__(f"{field}: {value!r} is not usable; {allowed}")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.field, self.value, self.allowed)
+
 
 class ConvergenceError(CircuittexError, RuntimeError):
     """An equilibrium that was not reached; `history` holds one row per iteration."""
@@ -35,3 +38,11 @@ class NgspiceError(CircuittexError, RuntimeError):
 
 class StoreError(CircuittexError, ValueError):
     """A results file that cannot be read: missing, damaged, or of another version."""
+
+
+class FolderError(CircuittexError, RuntimeError):
+    """A results folder that cannot be used as it is: in use by another run, or with results of something else."""
+
+
+class WorkerError(CircuittexError, RuntimeError):
+    """A worker process that died."""

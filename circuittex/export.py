@@ -6,6 +6,7 @@ import re
 from functools import partial
 from pathlib import Path
 
+from circuittex.atomic import write_text
 from circuittex.circuit import Circuit, build_circuit, reduced_circuit, yarn_end_terminals
 from circuittex.contact.merge import Simplified, simplify
 from circuittex.contact.state import ContactState
@@ -73,18 +74,29 @@ def state_word(state: str) -> str:
     return re.sub("[^a-z0-9]+", "_", state.lower().replace("--", "-minus-"))
 
 
+def detailed_file(state: str) -> str:
+    """Name of the file of a state's detailed sub-circuit."""
+    return f"{state}.sub"
+
+
+def netlist_files(design: Design, state: str, fit: Fit | None) -> tuple[str, ...]:
+    """Names of the files of all netlists of a state: the detailed one, a deck for each probe, the reduced one."""
+    decks = (f"{state}_{probe.name}.cir" for probe in design.probes)
+    reduced = (f"{state}_reduced.sub",) if fit is not None and 0 < fit.Ry < float("inf") else ()
+    return (detailed_file(state), *decks, *reduced)
+
+
 def write_netlists(folder: Path, design: Design, state: str, simple: Simplified, fit: Fit | None) -> Path:
     """Write all netlists of a state into `folder`; returns the path of the detailed sub-circuit."""
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{state}.sub"
-    texts = {path: detailed_netlist(design, state, simple)}
-    for probe in design.probes:
-        texts[folder / f"{state}_{probe.name}.cir"] = probe_netlist(design, state, simple, probe)
-    if fit is not None and 0 < fit.Ry < float("inf"):
-        texts[folder / f"{state}_reduced.sub"] = reduced_netlist(design, state, fit)
-    for file, text in texts.items():
-        file.write_text(text, encoding="ascii")
-    return path
+    texts = [detailed_netlist(design, state, simple)]
+    texts += [probe_netlist(design, state, simple, probe) for probe in design.probes]
+    files = netlist_files(design, state, fit)
+    if fit is not None and len(files) > len(texts):
+        texts.append(reduced_netlist(design, state, fit))
+    for name, text in zip(files, texts, strict=True):
+        write_text(folder / name, text, encoding="ascii")
+    return folder / files[0]
 
 
 def _header(design: Design, state: str) -> partial[Header]:

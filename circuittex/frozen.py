@@ -36,7 +36,15 @@ def frozen(cls: type[T]) -> type[T]:
         if inner is not None:
             inner(self)
 
+    def restore(self: Any, state: dict[str, Any]) -> None:
+        # What comes from another process, or is a copy, has writeable arrays of its own.
+        for name, value in state.items():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
     cls.__post_init__ = lock  # type: ignore[attr-defined]
+    cls.__setstate__ = restore  # type: ignore[attr-defined]
     return dataclass(frozen=True, eq=False)(cls)
 
 

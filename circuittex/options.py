@@ -76,13 +76,27 @@ def _add_run(commands: Commands) -> None:
         "Relaxes the woven cell of DESIGN, follows its loading paths, and for every recorded state solves\n"
         "voltage and temperature for each probe, writes the netlists, has ngspice confirm them and fits Ry and\n"
         "Rc. Leaves in DIR: summary.json, report.html, the netlists, all results in HDF5, figures, and files\n"
-        "for ParaView. States are written one by one: what an interrupted run has finished stays usable.\n"
-        "What an earlier run left in DIR is removed first. Exit code 1 where routes differ by more than 1e-9;\n"
-        "without ngspice the run completes and says that it did not check.",
+        "for ParaView. States are written one by one: however a run ends, the same command goes on from the\n"
+        "states that are finished, with the same numbers. Loading paths are computed beside one another, as far\n"
+        "as there are cores. Results of another design in DIR are refused, and so is a DIR that another run is\n"
+        "writing to. Exit code 1 where routes differ by more than 1e-9; without ngspice the run completes and\n"
+        "says that it did not check.",
         "circuittex run examples/plain_weave.toml --out results/plain_weave",
     )
     parser.add_argument("design", metavar="DESIGN", type=Path, help="design file (TOML); see 'circuittex new'")
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder of the results; made if missing")
+    parser.add_argument(
+        "--fresh",
+        action="store_true",
+        help="start again: remove what earlier runs left in DIR, of this design or another; your own files stay",
+    )
+    parser.add_argument(
+        "--workers",
+        metavar="N",
+        type=int,
+        help="processes that compute loading paths beside one another, at most one for each path (default: the cores "
+        "there are); the numbers do not depend on it",
+    )
     parser.add_argument("--quiet", action="store_true", help="show no progress and no closing table")
 
 
@@ -134,7 +148,8 @@ def _add_report(commands: Commands) -> None:
         commands,
         "report",
         "draw figures and report again from the stored results",
-        "Rebuilds figures, report.html and summary.json from the HDF5 file of a results folder. Solves nothing.",
+        "Rebuilds figures, report.html and summary.json from the HDF5 file of a results folder. Solves nothing.\n"
+        "A folder that a run is writing to is refused: the run draws the report itself when it is done.",
         "circuittex report results/plain_weave",
     )
     _add_results(parser)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from circuittex.contact.state import ContactState
 from circuittex.design import Design
+from circuittex.discretisation import ErrorEstimate
 from circuittex.fields import Fields
 from circuittex.fit import Fit
 from circuittex.frozen import frozen
@@ -29,9 +30,11 @@ class Record:
     residual: float
     """Largest free-dof force, N."""
     iterations: int
-    """Newton iterations spent on this state."""
+    """Newton iterations spent on this state, those of tries that did not converge included."""
+    parts: int
+    """Parts into which the increment to this state was halved; 1 where it converged as a whole."""
     history: Floats
-    """(n, 4) per iteration: residual N, energy N mm, shift N/(mm g), step length."""
+    """(n, 4) per iteration of the last part: residual N, energy N mm, shift N/(mm g), step length."""
     clamp_force: Floats
     """(2, 3) total force of the clamps on the +x ends of the warp and the +y ends of the weft, N [40, 41]."""
     section_force: Floats
@@ -53,7 +56,7 @@ class Record:
     levels: int
     """Levels in which the fibrils of the centre warp yarn lie at its centre crossing."""
     netlist: str
-    """Path of the detailed sub-circuit, relative to the results folder."""
+    """Path of the detailed sub-circuit, relative to the results folder (if the study has one)."""
 
     @property
     def currents(self) -> tuple[float, ...]:
@@ -81,4 +84,10 @@ class Study:
     initial: Configuration
     """The configuration before the first relaxation."""
     records: tuple[Record, ...]
-    """The recorded states in the order of their computation."""
+    """The recorded states: the relaxed one, then path by path in the order of the design."""
+    errors: tuple[ErrorEstimate, ...] = ()
+    """Estimated discretisation errors, in the order of their states; not every state has one."""
+
+    def error_of(self, state: str) -> ErrorEstimate | None:
+        """The error estimate of a state, if it has one."""
+        return next((estimate for estimate in self.errors if estimate.state == state), None)

@@ -54,6 +54,7 @@ from typing import Any
 
 import numpy as np
 
+from circuittex.atomic import write_text
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results import Record, Study
 from circuittex.verify import AGREEMENT
@@ -81,7 +82,7 @@ def summary(study: Study) -> dict[str, Any]:
 def write_summary(path: str | Path, study: Study) -> None:
     """Write summary.json."""
     text = json.dumps(summary(study), indent=2, allow_nan=False, ensure_ascii=False)
-    Path(path).write_text(text + "\n", encoding="utf-8")
+    write_text(path, text + "\n")
 
 
 def table(study: Study) -> str:

@@ -10,6 +10,7 @@ import meshio
 import numpy as np
 
 from circuittex import tubes
+from circuittex.atomic import replacing
 from circuittex.geometry.mesh import FibrilMesh, Ints
 from circuittex.results import Record
 
@@ -51,7 +52,8 @@ def write_vtu(path: str | Path, mesh: FibrilMesh, record: Record, sides: int = S
         point_data={name: np.repeat(values, sides) for name, values in node_data.items()},
         cell_data={name: [np.repeat(values, sides)] for name, values in span_data.items()},
     )
-    meshio.write(Path(path), tube, file_format="vtu", binary=True, compression="zlib")
+    with replacing(path) as partial:
+        meshio.write(partial, tube, file_format="vtu", binary=True, compression="zlib")
 
 
 def quads(nodes: Ints, sides: int) -> Ints:
@@ -90,4 +92,5 @@ def write_pvd(path: str | Path, entries: Iterable[tuple[float, str]]) -> None:
     for strain, file in entries:
         ElementTree.SubElement(collection, "DataSet", timestep=repr(strain), group="", part="0", file=file)
     ElementTree.indent(root)
-    ElementTree.ElementTree(root).write(Path(path), encoding="utf-8", xml_declaration=True)
+    with replacing(path) as partial:
+        ElementTree.ElementTree(root).write(partial, encoding="utf-8", xml_declaration=True)

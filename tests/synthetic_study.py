@@ -75,6 +75,7 @@ def _record(
         configuration=_flattened(mesh, gradient),
         residual=3e-8,
         iterations=52 if not path else 14,
+        parts=1,
         history=rng.random((5, 4)),
         clamp_force=np.array([[1.49 + slope * strain, 0.01, 0.002], [0.001, 1.49 + 2 * strain, -0.01]]),
         section_force=0.03 + 0.01 * np.sin(mesh.xi[mesh.elements[:, 0]] + mesh.element_fibril) + 0.2 * strain,

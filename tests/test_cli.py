@@ -119,7 +119,7 @@ def test_run_shows_progress_and_ends_with_a_table(
 ) -> None:
     study = synthetic_study()
 
-    def fake(design: Design, out: Path, *, progress: Callable[[str], None]) -> Study:
+    def fake(design: Design, out: Path, *, progress: Callable[[str], None], **_: object) -> Study:
         progress("relaxed: iteration 1")
         return study
 
@@ -135,7 +135,7 @@ def test_run_shows_progress_and_ends_with_a_table(
 def test_quiet_run_says_nothing(
     design_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    replace_study(monkeypatch, lambda design, out, *, progress: (progress("x"), synthetic_study(1))[1])
+    replace_study(monkeypatch, lambda design, out, *, progress, **_: (progress("x"), synthetic_study(1))[1])
     assert main(["run", str(design_file), "--out", str(tmp_path / "out"), "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
 
@@ -250,7 +250,7 @@ def test_interrupted_run_says_what_it_kept(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def interrupted(design: Design, out: Path, *, progress: Callable[[str], None]) -> Study:
+    def interrupted(design: Design, out: Path, **_: object) -> Study:
         if states:
             write_study_start(out / "results.h5", synthetic_study(states, contacts=10))
         raise KeyboardInterrupt

@@ -13,15 +13,16 @@ import pytest
 import circuittex
 
 PACKAGE = Path(circuittex.__file__).parent
-SHARED = {"frozen", "errors", "compiled"}
+SHARED = {"frozen", "errors", "compiled", "atomic"}
 
 # Stage -> the stages and modules it may import, besides SHARED and itself (docs/architecture.md). A dotted name
 # allows one module of a stage only; without a dot the whole stage is allowed.
 STATE = {"contact.state", "geometry.mesh"}
-RESULT_TYPES = {*STATE, "design", "fields", "fit", "verify", "mech.configuration"}
+RESULT_TYPES = {*STATE, "design", "discretisation", "fields", "fit", "verify", "mech.configuration"}
 ROUTES = {"fields", "circuit", "nodal", "netlist", "ngspice"}
 OUTPUTS = {"store", "summary", "plot", "report", "vtu"}
 ALLOWED: dict[str, set[str]] = {
+    "atomic": set(),
     "frozen": set(),
     "compiled": set(),
     "errors": set(),
@@ -61,9 +62,18 @@ ALLOWED: dict[str, set[str]] = {
     "plot": {*RESULT_TYPES, "results", "tubes", "summary", "paths"},
     "claims": {*RESULT_TYPES, "geometry.levels", "results", "tubes", "summary", "paths"},
     "report": {*RESULT_TYPES, "results", "summary", "paths", "claims", "plot"},
-    "study": {
+    "lock": set(),
+    "workers": set(),
+    "plan": {"design", "export", "geometry.mesh"},
+    "record": {
         *{"design", "geometry", "mech", "contact", "relaxation", "increment", "fields", "fit", "verify"},
-        *{"verify_reduced", "export", "results", *OUTPUTS},
+        *{"verify_reduced", "export", "results", "plan"},
+    },
+    "folder": {"discretisation", "export", "results", *OUTPUTS},
+    "schedule": {"mech.configuration", "mech.linear", "increment", "plan", "record", "results", "workers"},
+    "study": {
+        *{"design", "geometry.weave", "mech.configuration", "mech.linear"},
+        *{"folder", "lock", "plan", "record", "results", "schedule", "workers"},
     },
 }
 ANYTHING = {"cli", "__main__"}  # the command line, which nobody imports
@@ -77,6 +87,7 @@ LIBRARIES: dict[str, set[str]] = {
     "networkx": {"circuit"},
     "PySpice": {"pyspice_export"},
     "h5py": {"store"},
+    "filelock": {"lock"},
     "meshio": {"vtu"},
     "matplotlib": {"plot"},
 }

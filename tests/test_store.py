@@ -267,3 +267,20 @@ def test_killed_while_appending(tmp_path: Path, delay: float) -> None:
     assert all(same(record, STUDY.records[0]) for record in loaded.records)
     append_record(path, STUDY.records[1])  # whatever the kill left behind is no obstacle
     assert same(load_study(path).records[-1], STUDY.records[1])
+
+
+def test_reading_and_appending_do_not_hinder_each_other(stored: Path) -> None:
+    """Whoever looks at results while a run adds to them sees the old file to its end, and the run goes on."""
+    with h5py.File(stored, "r") as reader:
+        append_record(stored, STUDY.records[0])
+        assert len(reader["records"]) == len(STUDY.records)
+    assert len(load_study(stored).records) == len(STUDY.records) + 1
+
+
+def test_records_of_paths_that_came_on_side_by_side_are_loaded_path_by_path(tmp_path: Path) -> None:
+    study = synthetic_study(3, contacts=10, rows=(1,), paths=("stretch", "shear"))
+    path = tmp_path / "results.h5"
+    write_study_start(path, replace(study, records=()))
+    for number in (0, 3, 1, 4, 2):
+        append_record(path, study.records[number])
+    assert same(load_study(path), study)

@@ -1,110 +1,203 @@
-"""A study as a whole: the names of its states, and what a run does to a folder that holds an earlier one."""
+"""A study as a whole: however it is interrupted, the same call ends with the same numbers, bit for bit."""
 
 from __future__ import annotations
 
+import errno
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from canned import Canned, canned_study, files, report, untimed
 from fabrics import small_cell
-from synthetic_study import synthetic_study
 
-from circuittex.design import Loading, shear
-from circuittex.errors import DesignError
-from circuittex.export import simplified, write_netlists
-from circuittex.plot import FIGURES
-from circuittex.spice_names import safe_name
-from circuittex.store import load_study, write_study_start
-from circuittex.study import run_study, state_names
-from circuittex.summary import write_summary
-from circuittex.vtu import write_collections, write_vtu
+from circuittex.design import Design, shear, uniaxial
+from circuittex.errors import ConvergenceError, DesignError, FolderError, StoreError
+from circuittex.frozen import same
+from circuittex.lock import locked
+from circuittex.mech.linear import SuperLUSolver
+from circuittex.store import load_study
+from circuittex.store.archive import Digests
+from circuittex.study import cores, run_study
 
-FOREIGN = {
-    "notes.txt": "mine",
-    "netlists/bench.cir": "* my bench\n.include relaxed.sub\n.end\n",
-    "netlists/README": "* circuittex made the others",
-    "vtu/view.pvd": '<VTKFile type="Collection"></VTKFile>',
-    "vtu/other.vtu": "<VTKFile></VTKFile>",
-    "figures/mine.png": "Matplotlib",
-    "figures/cell.pdf": "mine",
-    "old/report.html": "an archived one",
-}
+STUDY = canned_study(2)
+PATIENCE = 600.0
+"""Seconds that a state may take where its kernels have to be compiled first and the machine is busy."""
 
 
-def files(folder: Path) -> set[str]:
-    return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+def cell() -> Design:
+    """Four fibrils, stretched and sheared, without probes: as little as can be computed in a second or two."""
+    design, _ = small_cell((1,), elements=4, order=1, section_degree=6)
+    loading = (uniaxial("stretch", (0.02, 0.04)), shear("shear", (0.05, 0.1), free="y"))
+    return replace(design, terminals=(), probes=(), loading=loading)
 
 
-@pytest.fixture
-def used(tmp_path: Path) -> Path:
-    """A folder with the results of a longer study, and with files of somebody else."""
-    study = synthetic_study(3, contacts=10, rows=(1,))
-    for name in ("netlists", "vtu", "figures", "old"):
-        (tmp_path / name).mkdir()
-    write_study_start(tmp_path / "results.h5", study)
-    write_summary(tmp_path / "summary.json", study)
-    (tmp_path / "report.html").write_text("a report", encoding="utf-8")
-    for record in study.records:
-        write_vtu(tmp_path / "vtu" / f"{record.name}.vtu", study.mesh, record, sides=3)
-        write_netlists(
-            tmp_path / "netlists", study.design, record.name, simplified(study.design, record.contacts), record.fit
-        )
-    write_collections(tmp_path / "vtu", study.records)
-    for figure in FIGURES:  # drawing takes long and has tests of its own
-        for kind in ("png", "svg"):
-            (tmp_path / "figures" / f"{figure}.{kind}").touch()
-    for name, text in FOREIGN.items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    return tmp_path
+# Kills, at any moment
 
 
-def test_an_interrupted_rerun_leaves_nothing_of_the_run_before(used: Path) -> None:
-    def interrupt(_: str) -> None:
-        raise KeyboardInterrupt
-
-    assert len(files(used)) == 3 + 3 * 5 + 3 + 1 + 2 * len(FIGURES) + len(FOREIGN)
-    design, _ = small_cell(elements=4)
-    with pytest.raises(KeyboardInterrupt):
-        run_study(design, used, progress=interrupt)
-    assert files(used) == {*FOREIGN, "results.h5"}
-    assert {name: (used / name).read_text(encoding="utf-8") for name in FOREIGN} == FOREIGN
-    left = load_study(used / "results.h5")
-    assert (left.design.name, left.records) == (design.name, ())
+class Killed(BaseException):
+    """The end of a process as the disk sees it: nothing is written or removed any more."""
 
 
-def test_a_design_that_cannot_be_laid_out_removes_nothing(used: Path) -> None:
-    before = files(used)
-    design, _ = small_cell()
-    yarn = design.weave.warp[0]
-    crowded = type(yarn)(yarn.name, yarn.rows, yarn.radius, yarn.spacing / 4, yarn.row_spacing, yarn.materials)
-    weave = type(design.weave)(
-        design.weave.draft, (crowded,) * 2, (crowded,) * 2, design.weave.pitch, design.weave.amplitude
-    )
-    with pytest.raises(DesignError, match="inside one another"):
-        run_study(type(design)("crowded", weave, design.contact), used)
-    assert files(used) == before
+class Disk:
+    """Counts what changes the disk, and from the `last` change on refuses."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, error: Callable[[], BaseException]) -> None:
+        self.changes, self.last, self._error = 0, sys.maxsize, error
+        for owner, name in ((os, "fsync"), (Path, "replace"), (Path, "unlink"), (Path, "mkdir")):
+            self._watch(monkeypatch, owner, name)
+
+    def _watch(self, monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> None:
+        original = getattr(owner, name)
+
+        def watched(*arguments: object, **options: object) -> object:
+            # The lock is the system's to release; its file is none of the results.
+            if not any(".circuittex." in str(argument) for argument in arguments):
+                self.changes += 1
+                if self.changes > self.last:
+                    raise self._error()
+            return original(*arguments, **options)
+
+        monkeypatch.setattr(owner, name, watched)
 
 
-@pytest.mark.parametrize(
-    "loading",
-    [
-        (shear("a", (1.0, 1.0)), shear("a-1", (2.0,))),  # a-1-2 twice
-        (shear("a-", (5.0,)), shear("a", (-5.0,))),  # a--5 twice
-        (shear("a", (0.05, -0.05)),),  # signs are no letters in a netlist
-        (shear("a_0", (5.0,)), shear("a-0", (5.0,))),
-        (shear("a", (1.0, 1.0 + 1e-12, 1.0)),),  # equal to the digits shown
-    ],
-)
-def test_every_state_has_a_name_of_its_own(loading: tuple[Loading, ...]) -> None:
-    names = state_names(loading)
-    assert [len(path) for path in names] == [len(path.strains) for path in loading]
-    flat = [name for path in names for name in path]
-    assert len({name.lower() for name in flat}) == len(flat)
-    assert all(name.startswith(path.name) for path, group in zip(loading, names, strict=True) for name in group)
+@pytest.mark.parametrize("part", [0.02, 0.19, 0.3, 0.42, 0.5, 0.73, 0.84, 0.97])
+def test_killed_between_any_two_changes_of_the_disk(
+    part: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    canned = Canned(STUDY).install(monkeypatch)
+    disk = Disk(monkeypatch, Killed)
+    run_study(STUDY.design, tmp_path / "whole", workers=1)
+    whole, disk.last, disk.changes = files(tmp_path / "whole"), int(part * disk.changes), 0
+    with pytest.raises(Killed):
+        run_study(STUDY.design, tmp_path / "killed", workers=1)
+    disk.last = sys.maxsize
+    first, canned.reached = canned.reached[len(STUDY.records) :], []
+    if (tmp_path / "killed" / "results.h5").exists():
+        kept = [record.name for record in load_study(tmp_path / "killed" / "results.h5").records]
+        assert kept in (first, first[:-1])  # at most the state that was being written is computed again
+    else:
+        kept = []
+    assert same(run_study(STUDY.design, tmp_path / "killed", workers=1), STUDY)
+    assert canned.reached == [record.name for record in STUDY.records if record.name not in kept]
+    assert files(tmp_path / "killed") == whole
+    for name in whole - {"results.h5", "results.h5.partial"}:
+        assert (tmp_path / "killed" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
-def test_names_stay_plain_where_they_can() -> None:
-    assert state_names((shear("stretch", (0.025, 0.05, -0.05)), shear("back", (0.05,)))) == (
-        ("stretch-0.025", "stretch-0.05", "stretch--0.05"),
-        ("back-0.05",),
-    )
-    assert safe_name("stretch-0.05") == safe_name("stretch--0.05")  # why the sub-circuits spell the minus out
+RUN = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import circuittex.folder
+import test_study
+from canned import report
+circuittex.folder.write_report = report
+from circuittex.study import run_study
+run_study(test_study.cell(), sys.argv[2], workers=int(sys.argv[3]))
+"""
+
+
+def start(folder: Path, workers: int) -> subprocess.Popen[bytes]:
+    return subprocess.Popen([sys.executable, "-c", RUN, str(Path(__file__).parent), str(folder), str(workers)])
+
+
+def states(folder: Path) -> int:
+    return len(load_study(folder / "results.h5").records) if (folder / "results.h5").exists() else 0
+
+
+def test_interrupted_then_killed_then_completed_by_other_numbers_of_workers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = 0
+    for workers, end in ((2, signal.SIGINT), (2, signal.SIGKILL)):
+        deadline = time.monotonic() + PATIENCE
+        with start(tmp_path, workers) as process:
+            while states(tmp_path) == kept:
+                assert process.poll() is None
+                assert time.monotonic() < deadline
+                time.sleep(0.01)
+            process.send_signal(end)
+            assert process.wait(PATIENCE) != 0
+        assert states(tmp_path) > kept  # no state that was there is lost
+        kept = states(tmp_path)
+    monkeypatch.setattr("circuittex.folder.write_report", report)
+    run_study(cell(), tmp_path, workers=1)
+    found, whole = untimed(load_study(tmp_path / "results.h5")), untimed(run_study(cell(), workers=1))
+    assert same(found, whole)
+    assert Digests()(found) == Digests()(whole)  # also the sign of zeros
+
+
+# Solvers, workers
+
+
+def test_the_solver_is_made_anew_for_every_relaxation() -> None:
+    made: list[SuperLUSolver] = []
+
+    def make() -> SuperLUSolver:
+        made.append(SuperLUSolver())
+        return made[-1]
+
+    run_study(replace(cell(), loading=(shear("shear", (0.05,)),)), solver=make, workers=2)
+    assert len(made) == 2
+
+
+@pytest.mark.parametrize("workers", [0, -1, 1.5, "2"])
+def test_workers_are_a_whole_number(workers: object, tmp_path: Path) -> None:
+    with pytest.raises(DesignError, match="workers"):
+        run_study(STUDY.design, tmp_path / "out", workers=workers)  # type: ignore[arg-type]
+    assert not (tmp_path / "out").exists()
+
+
+def test_one_path_needs_no_other_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = canned_study(3, ("stretch",))
+    Canned(study).install(monkeypatch)
+    monkeypatch.setattr("circuittex.study.Pool", None)
+    assert same(run_study(study.design, workers=8), study)
+    assert cores() >= 1
+
+
+def test_a_path_that_does_not_converge_keeps_the_rest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    canned = Canned(STUDY).install(monkeypatch)
+
+    def fail(name: str) -> None:
+        if name.startswith("stretch"):
+            raise ConvergenceError(f"{name}: no equilibrium")
+
+    canned.before = fail
+    with pytest.raises(ConvergenceError, match=r"stretch-0\.025: no equilibrium"):
+        run_study(STUDY.design, tmp_path, workers=1)
+    assert [r.name for r in load_study(tmp_path / "results.h5").records] == ["relaxed", "shear-0.025"]
+    assert not (tmp_path / "report.html").exists()
+
+
+# Folders
+
+
+def test_a_folder_in_use_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Canned(STUDY).install(monkeypatch)
+    with locked(tmp_path), pytest.raises(FolderError, match=f"writing there already .process {os.getpid()}"):
+        run_study(STUDY.design, tmp_path)
+    assert files(tmp_path) == set()
+
+
+@pytest.mark.parametrize("part", [0.1, 0.5, 0.95])
+def test_a_full_disk_keeps_every_state_and_says_so(
+    part: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Canned(STUDY).install(monkeypatch)
+    with monkeypatch.context() as patch:
+        disk = Disk(patch, lambda: OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
+        run_study(STUDY.design, tmp_path / "whole", workers=1)
+        disk.last, disk.changes = int(part * disk.changes), 0
+        with pytest.raises(StoreError) as told:
+            run_study(STUDY.design, tmp_path / "full", workers=1)
+    kept = len(load_study(tmp_path / "full" / "results.h5").records)
+    assert "No space left on device" in str(told.value)
+    assert f"{kept} of 3 states are kept in {tmp_path / 'full'}" in str(told.value)
+    assert same(run_study(STUDY.design, tmp_path / "full", workers=1), STUDY)
+    assert files(tmp_path / "full") == files(tmp_path / "whole")

@@ -12,6 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from circuittex.atomic import replacing
+
 DOTS = 160
 """Dots per inch of PNG files and of the pictures inside SVG files."""
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
@@ -64,6 +66,8 @@ def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
         if layout is not None:
             layout.execute(figure)  # found once and kept; each file would find it again
             figure.set_layout_engine("none")
-        figure.savefig(png, dpi=DOTS, metadata={"Software": None})
-        figure.savefig(svg, dpi=DOTS, metadata={"Date": None, "Creator": "circuittex"})
+        with replacing(png) as partial:
+            figure.savefig(partial, format="png", dpi=DOTS, metadata={"Software": None})
+        with replacing(svg) as partial:
+            figure.savefig(partial, format="svg", dpi=DOTS, metadata={"Date": None, "Creator": "circuittex"})
     return png, svg

@@ -11,6 +11,7 @@ from string import Template
 
 import numpy as np
 
+from circuittex.atomic import write_text
 from circuittex.claims.table import Table, claims_table
 from circuittex.plot import save_figures
 from circuittex.report.captions import captions
@@ -19,6 +20,7 @@ from circuittex.report.frame import PAGE
 from circuittex.results import Record, Study
 from circuittex.summary import agrees, confirmed, difference, insulated_resistance, ngspice_statement
 from circuittex.verify import AGREEMENT
+
 
 def write_report(folder: str | Path, study: Study, beside: Sequence[Study] = ()) -> Path:
     """Draw the figures into ``folder/figures`` and write ``folder/report.html``; returns its path.
@@ -30,7 +32,7 @@ def write_report(folder: str | Path, study: Study, beside: Sequence[Study] = ())
     folder.mkdir(parents=True, exist_ok=True)
     pictures = save_figures(study, folder / "figures") if study.records else {}
     path = folder / "report.html"
-    path.write_text(page(study, {name: file.read_bytes() for name, file in pictures.items()}, beside), encoding="utf-8")
+    write_text(path, page(study, {name: file.read_bytes() for name, file in pictures.items()}, beside))
     return path
 
 

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 
+from circuittex.atomic import replacing
+from circuittex.design import Design
+from circuittex.discretisation import ErrorEstimate
 from circuittex.errors import CircuittexError, StoreError
 from circuittex.results import Record, Study
 from circuittex.store.archive import Digests, Reader, Writer, registry
@@ -38,13 +42,15 @@ def write_study_start(path: str | Path, study: Study) -> None:
         head.attrs["@digest"] = writer.digest(tuple(getattr(study, name) for name in HEAD))
         file.create_group("records")
         for record in study.records:
-            _add(file, writer, record)
+            _add(file, "records", writer, record)
+        for estimate in study.errors:
+            _add(file, "errors", writer, estimate)
 
     _replace(Path(path), "w", fill)
 
 
 def append_record(path: str | Path, record: Record) -> None:
-    """Add one recorded state to the results file at `path`.
+    """Add one recorded state to the results file at `path`; within its loading path the states come in their order.
 
     The file is read into memory, extended there, written beside the old one and put in its place in one step, so
     that at every moment the file at `path` is complete, with or without the new record.
@@ -52,11 +58,15 @@ def append_record(path: str | Path, record: Record) -> None:
     Errors: `StoreError` where there is no results file at `path`, or it cannot be written.
     """
 
-    def fill(file: h5py.File) -> None:
-        _check_layout(file)
-        _add(file, Writer(file), record)
+    _append(path, "records", record)
 
-    _replace(Path(path), "r+", fill)
+
+def append_error(path: str | Path, estimate: ErrorEstimate) -> None:
+    """Add the error estimate of a recorded state to the results file at `path`, in the manner of `append_record`.
+
+    Errors: `StoreError` as there.
+    """
+    _append(path, "errors", estimate)
 
 
 def load_study(path: str | Path) -> Study:
@@ -71,28 +81,51 @@ def load_study(path: str | Path) -> Study:
         head = tuple(reader.get(file["study"], name) for name in HEAD)
         if file["study"].attrs["@digest"] != digest(head):
             raise StoreError("its content does not match its digest")
-        names = [_record_name(number) for number in range(len(file["records"]))]
-        records = tuple(reader.get(file["records"], name) for name in names)
-        for name, record in zip(names, records, strict=True):
-            if file["records"].attrs[f"@digest {name}"] != digest(record):
-                raise StoreError(f"record {name} does not match its digest")
-        return Study(**dict(zip(HEAD, head, strict=True)), records=records)
+        study = Study(**dict(zip(HEAD, head, strict=True)), records=())
+        records = _in_order(study.design, _members(file["records"], "record", reader, digest))
+        errors = _members(file["errors"], "error estimate", reader, digest) if "errors" in file else ()
+        place = {record.name: number for number, record in enumerate(records)}
+        return replace(study, records=records, errors=tuple(sorted(errors, key=lambda error: place[error.state])))
 
     path = Path(path)
     if not path.is_file():
         raise StoreError(f"{path}: there is no results file here")
-    with _as_store_error(path, "cannot be read"), h5py.File(path, "r") as file:
+    with _as_store_error(path, "cannot be read"), h5py.File(path, "r", locking=False) as file:
         return read(file)
 
 
-def _add(file: h5py.File, writer: Writer, record: Record) -> None:
-    records = file["records"]
-    name = _record_name(len(records))
-    writer.put(records, name, record)
-    records.attrs[f"@digest {name}"] = writer.digest(record)
+def _in_order(design: Design, records: Sequence[Record]) -> tuple[Record, ...]:
+    """The records path by path, whatever the order in which the paths came on; within a path it is theirs."""
+    rank = {"": 0} | {loading.name: number for number, loading in enumerate(design.loading, start=1)}
+    return tuple(sorted(records, key=lambda record: rank[record.path]))
 
 
-def _record_name(number: int) -> str:
+def _append(path: str | Path, group: str, value: Record | ErrorEstimate) -> None:
+    def fill(file: h5py.File) -> None:
+        _check_layout(file)
+        _add(file, group, Writer(file), value)
+
+    _replace(Path(path), "r+", fill)
+
+
+def _add(file: h5py.File, group: str, writer: Writer, value: Record | ErrorEstimate) -> None:
+    members = file.require_group(group)
+    name = _name(len(members))
+    writer.put(members, name, value)
+    members.attrs[f"@digest {name}"] = writer.digest(value)
+
+
+def _members(group: h5py.Group, what: str, reader: Reader, digest: Digests) -> tuple[Any, ...]:
+    """The members of a group in the order of their numbers, each checked against its digest."""
+    names = [_name(number) for number in range(len(group))]
+    members = tuple(reader.get(group, name) for name in names)
+    for name, member in zip(names, members, strict=True):
+        if group.attrs[f"@digest {name}"] != digest(member):
+            raise StoreError(f"{what} {name} does not match its digest")
+    return members
+
+
+def _name(number: int) -> str:
     return f"{number:04d}"
 
 
@@ -106,35 +139,17 @@ def _check_layout(file: h5py.File) -> None:
 
 def _replace(path: Path, mode: str, fill: Callable[[h5py.File], None]) -> None:
     # HDF5 works in memory only: a full disk then meets plain Python I/O, from which one can recover, and not the HDF5
-    # library, which cannot close a file it could not flush.
-    partial = path.with_name(path.name + ".partial")
+    # library, which cannot close a file it could not flush. Nor does it lock: the file that somebody reads is never
+    # changed, only replaced.
     if mode == "r+" and not path.is_file():
         raise StoreError(f"{path}: there is no results file here")
     with _as_store_error(path, "cannot be written"):
-        with h5py.File(path, mode, driver="core", backing_store=False, libver=LIBVER) as file:
+        with h5py.File(path, mode, driver="core", backing_store=False, libver=LIBVER, locking=False) as file:
             fill(file)
             file.flush()
             image = file.id.get_file_image()
-        try:
-            with partial.open("wb") as out:
-                out.write(image)
-                out.flush()
-                os.fsync(out.fileno())
-            partial.replace(path)
-        except OSError:
-            partial.unlink(missing_ok=True)
-            raise
-        _sync_folder(path.parent)
-
-
-def _sync_folder(folder: Path) -> None:
-    # The rename itself must survive a power cut; Windows has no such call and needs none.
-    if os.name == "posix":
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+        with replacing(path) as partial:
+            partial.write_bytes(image)
 
 
 @contextlib.contextmanager

@@ -19,8 +19,8 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
         name of the state, its loading path (empty for the relaxed state), and the strain that labels it
     ``gradient``
         2 x 2 average in-plane deformation gradient from the relaxed state
-    ``residual_N``, ``newton_iterations``
-        largest free-dof force at the end, and the iterations this took
+    ``residual_N``, ``newton_iterations``, ``parts``
+        largest free-dof force at the end, the iterations this took, and into how many parts the increment was halved
     ``clamp_force_N``
         ``x``: total force of the clamps on the +x ends of the warp; ``y``: on the +y ends of the weft; three
         components each [40, 41]
@@ -86,18 +86,45 @@ def write_summary(path: str | Path, study: Study) -> None:
 
 
 def table(study: Study) -> str:
-    """The closing table of a run: one line for each state, then whether ngspice confirmed them."""
+    """The closing table of a run: one line for each state, then what the study took and whether ngspice confirmed it.
+
+    A blank line parts the loading paths.
+    """
     head = ["state", "Fx warp N", "Fy weft N", *(f"{probe.name} A" for probe in study.design.probes)]
-    rows = [[*head, "Ry ohm", "Rc ohm", "routes differ"]]
+    rows = [[*head, "Ry ohm", "Rc ohm", "iterations", "routes differ"]]
+    path = ""
     for record in study.records:
+        if record.path != path:
+            rows.append([""] * len(rows[0]))
+            path = record.path
         numbers = [record.clamp_force[0, 0], record.clamp_force[1, 1], *record.currents, record.fit.Ry, record.fit.Rc]
-        rows.append([record.name, *(f"{number:.4g}" for number in numbers), f"{difference(record):.1e}"])
+        rows.append([record.name, *(f"{number:#.4g}" for number in numbers)])
+        rows[-1] += [str(record.iterations), f"{difference(record):.1e}"]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
-        "  ".join([row[0].ljust(widths[0]), *(text.rjust(w) for text, w in zip(row[1:], widths[1:], strict=True))])
+        "  ".join(
+            [row[0].ljust(widths[0]), *(text.rjust(w) for text, w in zip(row[1:], widths[1:], strict=True))]
+        ).rstrip()
         for row in rows
     ]
-    return "\n".join([*lines, "", *ngspice_statement(study)])
+    return "\n".join([*lines, "", *effort(study), *ngspice_statement(study)])
+
+
+def effort(study: Study) -> tuple[str, ...]:
+    """Sentences that say what the equilibria of the study took, and how good they are."""
+    if not study.records:
+        return ()
+    iterations = [record.iterations for record in study.records]
+    worst = max(study.records, key=lambda record: record.residual)
+    states = "1 equilibrium" if len(iterations) == 1 else f"{len(iterations)} equilibria"
+    sentences = [
+        f"{states} in {sum(iterations)} Newton iterations, at most {max(iterations)} for one; the largest free force "
+        f"is {worst.residual:.1e} N in {worst.name} ({study.design.numerics.tolerance:.0e} N is allowed)."
+    ]
+    halved = [f"{record.name} in {record.parts} parts" for record in study.records if record.parts > 1]
+    if halved:
+        sentences.append(f"Increments too large to converge as a whole were halved: {', '.join(halved)}.")
+    return tuple(sentences)
 
 
 def ngspice_statement(study: Study) -> tuple[str, ...]:
@@ -185,6 +212,7 @@ def _state(record: Record) -> dict[str, Any]:
         "gradient": record.gradient,
         "residual_N": record.residual,
         "newton_iterations": record.iterations,
+        "parts": record.parts,
         "clamp_force_N": {"x": record.clamp_force[0], "y": record.clamp_force[1]},
         "currents_A": record.currents,
         "peak_temperature_K": record.peak_temperature,

@@ -15,7 +15,7 @@ from synthetic_study import INSULATED, synthetic_study
 
 from circuittex.frozen import same
 from circuittex.results import Study
-from circuittex.summary import insulated_resistance, ngspice_statement, summary, table, write_summary
+from circuittex.summary import effort, insulated_resistance, ngspice_statement, summary, table, write_summary
 
 STUDY = synthetic_study(3, contacts=40)
 
@@ -50,7 +50,7 @@ def test_keys_that_the_documentation_promises(tmp_path: Path) -> None:
     assert state["name"] == "stretch-0.0250"
     assert state["strain"] == 0.025
     assert state["residual_N"] == record.residual
-    assert state["newton_iterations"] == 14
+    assert (state["newton_iterations"], state["parts"]) == (14, 1)
     assert state["clamp_force_N"] == {"x": record.clamp_force[0].tolist(), "y": record.clamp_force[1].tolist()}
     assert state["currents_A"] == [float(fields.currents[0]) for fields in record.fields]
     assert len(state["currents_A"]) == 3
@@ -87,9 +87,22 @@ def test_insulated_resistance_is_that_of_the_paper() -> None:
 
 def test_table_has_a_line_for_each_state() -> None:
     lines = table(STUDY).splitlines()
-    assert [line.split()[0] for line in lines[:4]] == ["state", "relaxed", "stretch-0.0250", "stretch-0.0500"]
-    assert len({len(line) for line in lines[:4]}) == 1
+    assert [line[:15].rstrip() for line in lines[:5]] == ["state", "relaxed", "", "stretch-0.0250", "stretch-0.0500"]
+    assert len({len(line) for line in lines[:5] if line}) == 1
+    assert lines[4].split()[1:3] == [f"{STUDY.records[2].clamp_force[k, k]:#.4g}" for k in (0, 1)]
     assert lines[-1] == "ngspice confirmed every recorded state."
+
+
+def test_what_the_equilibria_took_is_said() -> None:
+    first, second, third = STUDY.records
+    study = replace(STUDY, records=(first, replace(second, residual=7e-7), replace(third, parts=4, iterations=90)))
+    assert effort(study) == (
+        "3 equilibria in 156 Newton iterations, at most 90 for one; the largest free force is 7.0e-07 N in "
+        "stretch-0.0250 (1e-06 N is allowed).",
+        "Increments too large to converge as a whole were halved: stretch-0.0500 in 4 parts.",
+    )
+    assert len(effort(STUDY)) == 1
+    assert effort(replace(STUDY, records=())) == ()
 
 
 def test_missing_ngspice_is_said_plainly() -> None:

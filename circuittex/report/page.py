@@ -18,7 +18,7 @@ from circuittex.report.captions import captions
 from circuittex.report.claims import claims_section
 from circuittex.report.frame import PAGE
 from circuittex.results import Record, Study
-from circuittex.summary import agrees, confirmed, difference, insulated_resistance, ngspice_statement
+from circuittex.summary import agrees, confirmed, difference, effort, insulated_resistance, ngspice_statement
 from circuittex.verify import AGREEMENT
 
 
@@ -136,12 +136,12 @@ def _forces(study: Study) -> str:
 
 
 def _equilibrium(study: Study) -> str:
-    head = ["state", "largest free force (N)", "Newton iterations", "levels", "contact points", "netlist"]
+    head = ["state", "largest free force (N)", "Newton iterations", "parts", "levels", "contact points", "netlist"]
     rows = [
-        [r.name, f"{r.residual:.1e}", str(r.iterations), str(r.levels), str(r.contacts.n_contacts), r.netlist]
+        [r.name, f"{r.residual:.1e}", *map(str, (r.iterations, r.parts, r.levels, r.contacts.n_contacts)), r.netlist]
         for r in study.records
     ]
-    return _table(head, rows)
+    return _table(head, rows) + "".join(f"<p>{escape(sentence)}</p>" for sentence in effort(study))
 
 
 def _network(study: Study) -> str:

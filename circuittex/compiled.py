@@ -1,11 +1,13 @@
-"""The decorator of compiled functions."""
+"""The decorator of compiled functions, and how many of them may run at once."""
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable
 from typing import TypeVar
 
-from numba import njit
+from numba import config, njit
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -18,3 +20,9 @@ def compiled(function: F) -> F:
     """
     kernel: F = njit(cache=True, nogil=True, error_model="numpy")(function)
     return kernel
+
+
+def cores() -> int:
+    """How many threads may run compiled functions: NUMBA_NUM_THREADS, and no more than this process has cores."""
+    own = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+    return min(own, int(config.NUMBA_NUM_THREADS))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
@@ -11,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from circuittex.compiled import cores
 from circuittex.geometry.mesh import Floats, Ints
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.kernels import N_STRAINS, beam_energy, section_force
@@ -102,7 +101,7 @@ class Beam:
         return q.reshape(-1, DOFS), *tables
 
     def _by_fibrils(self, kernel: Callable[..., object], *arguments: Any) -> None:
-        """Call a kernel for the elements of all fibrils, in as many pieces as there are cores.
+        """Call a kernel for the elements of all fibrils, in as many pieces as there are cores for them.
 
         Fibrils share no node: each piece has entries of its own, and no bit of the result depends on their number.
         """
@@ -168,11 +167,6 @@ class Beam:
             data,
         )
         return data
-
-
-def cores() -> int:
-    """How many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 def _straight(space: BeamSpace) -> tuple[Floats, Floats]:

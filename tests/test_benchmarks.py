@@ -14,7 +14,7 @@ from circuittex.circuit import reduced_circuit
 from circuittex.design import Design, plain_weave
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
-SCRIPTS = ["assembly", "compile", "mesh_study", "netlist", "network", "newton"]
+SCRIPTS = ["assembly", "compile", "mesh_study", "netlist", "network", "newton", "paper_tables"]
 ROUND_OFF = 1e-12
 """Relative difference of two routes to the same numbers, summed in different orders."""
 

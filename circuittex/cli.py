@@ -69,6 +69,7 @@ def _run(options: argparse.Namespace) -> int:
             design,
             options.out,
             fresh=options.fresh,
+            error_estimate=options.error_estimate,
             workers=options.workers,
             progress=progress,
         )

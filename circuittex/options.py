@@ -91,6 +91,13 @@ def _add_run(commands: Commands) -> None:
         help="start again: remove what earlier runs left in DIR, of this design or another; your own files stay",
     )
     parser.add_argument(
+        "--error-estimate",
+        action="store_true",
+        help="estimate the discretisation error of clamp forces, currents, Ry and Rc in the relaxed state and the last "
+        "state of each loading path, from three more relaxations each: on half and on twice as many elements, and with "
+        "twice as many contact points. A run made without gets them when it is repeated with this option",
+    )
+    parser.add_argument(
         "--workers",
         metavar="N",
         type=int,

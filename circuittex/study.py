@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from circuittex import __version__
 from circuittex.design import Design, design_hash
+from circuittex.discretisation import ErrorEstimate
+from circuittex.error_estimate import estimate_errors, variants, without_estimate
 from circuittex.errors import DesignError, StoreError
 from circuittex.folder import (
     complete,
+    keep_error,
     keep_record,
     needs_report,
     open_study,
@@ -37,6 +42,7 @@ def run_study(
     out: str | Path | None = None,
     *,
     fresh: bool = False,
+    error_estimate: bool = False,
     workers: int | None = None,
     solver: Callable[[], LinearSolver] = best_solver,
     progress: Say | None = None,
@@ -53,11 +59,16 @@ def run_study(
     are cores; with one, in this process. The results do not depend on it. `solver` makes the linear solver of each
     relaxation. `progress` is told in words what is being done; a line break ends what is worth keeping on the screen.
 
+    With `error_estimate` the relaxed state and the last of each loading path get estimates of their discretisation
+    errors, as far as they have none, each from three more relaxations (`estimate_error`).
+
     Raises `ConvergenceError` where equilibria are not found, once the other paths are done; `FolderError` where the
     folder cannot be used; `StoreError` where it cannot be written, on a full disk for example.
     """
     say = progress if progress is not None else _say_nothing
     count = _workers(workers)
+    if error_estimate:
+        variants(design)  # refuses what it must before any long work
     mesh = build_mesh(design)
     study = Study(
         version=__version__,
@@ -68,12 +79,13 @@ def run_study(
         records=(),
     )
     if out is None:
-        return _compute(study, count, solver, say, _with)
+        study = _compute(study, count, solver, say, _with)
+        return _estimate(study, count, solver, say, _with_error) if error_estimate else study
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     with locked(folder):
         study = open_study(folder, study, fresh=fresh)
-        return _in_folder(folder, study, count, solver, say)
+        return _in_folder(folder, study, count, solver, say, error_estimate)
 
 
 def _in_folder(
@@ -82,6 +94,7 @@ def _in_folder(
     workers: int,
     solver: Callable[[], LinearSolver],
     say: Say,
+    error_estimate: bool,
 ) -> Study:
     """Complete the study and everything in its folder."""
     total, kept = len(plan(study.design)), len(study.records)
@@ -98,6 +111,8 @@ def _in_folder(
 
     try:
         study = _compute(study, workers, solver, say, keep)
+        if error_estimate:
+            study = _estimate(study, workers, solver, say, partial(keep_error, folder))
         if needs_report(folder):
             say("figures and report")
         complete(folder, study)
@@ -125,6 +140,21 @@ def _compute(study: Study, workers: int, solver: Callable[[], LinearSolver], say
         pool.close()
 
 
+def _estimate(
+    study: Study,
+    workers: int,
+    solver: Callable[[], LinearSolver],
+    say: Say,
+    keep: Callable[[Study, ErrorEstimate], Study],
+) -> Study:
+    """The study with the error estimates that it lacks."""
+    workers = min(workers, len(without_estimate(study)))
+    if workers <= 1:
+        return estimate_errors(study, Here(say), solver, keep)
+    with closing(Pool(workers, threads=max(1, cores() // workers), say=say)) as pool:
+        return estimate_errors(study, pool, solver, keep)
+
+
 def cores() -> int:
     """The cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -140,6 +170,11 @@ def _workers(asked: int | None) -> int:
 def _with(study: Study, record: Record) -> Study:
     """The study with one more record."""
     return replace(study, records=(*study.records, record))
+
+
+def _with_error(study: Study, estimate: ErrorEstimate) -> Study:
+    """The study with one more error estimate."""
+    return replace(study, errors=(*study.errors, estimate))
 
 
 def _say_nothing(_: str) -> None:

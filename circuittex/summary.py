@@ -33,6 +33,12 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
         crossing
     ``netlist``
         path of the detailed netlist, relative to the folder of the file
+    ``error_estimate``
+        null, or the estimated discretisation error: ``elements`` of a fibril on the coarse, the own and the fine mesh,
+        ``contact_points`` of an element, own and more, ``moved_mm``, the largest distance of a node from its place in
+        the state on the coarse and the fine mesh and with more points, ``warnings``, and ``quantities``: ``name``,
+        ``unit``, ``value``, ``error`` and its parts ``mesh_error`` and ``contact_error``, ``relative_error``, observed
+        ``order``, and the values ``coarse``, ``fine`` and ``more_points``
     ``verification``
         ``routes``: the routes that answered; ``max_voltage_difference_V``: the largest difference of two routes in a
         node voltage, V per volt of the probe; ``max_current_difference``: in a terminal current, relative;
@@ -55,6 +61,7 @@ from typing import Any
 import numpy as np
 
 from circuittex.atomic import write_text
+from circuittex.discretisation import ErrorEstimate
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results import Record, Study
 from circuittex.verify import AGREEMENT
@@ -73,7 +80,7 @@ def summary(study: Study) -> dict[str, Any]:
             "parameters": study.design,
             "probes": [probe.name for probe in study.design.probes],
             "insulated_Ry_ohm": insulated_resistance(study.mesh),
-            "states": [_state(record) for record in study.records],
+            "states": [_state(record, study.error_of(record.name)) for record in study.records],
         }
     )
     return content
@@ -86,10 +93,8 @@ def write_summary(path: str | Path, study: Study) -> None:
 
 
 def table(study: Study) -> str:
-    """The closing table of a run: one line for each state, then what the study took and whether ngspice confirmed it.
-
-    A blank line parts the loading paths.
-    """
+    """The closing table of a run: one line for each state, with its estimated error where there is one, then what the
+    study took and whether ngspice confirmed it. A blank line parts the loading paths."""
     head = ["state", "Fx warp N", "Fy weft N", *(f"{probe.name} A" for probe in study.design.probes)]
     rows = [[*head, "Ry ohm", "Rc ohm", "iterations", "routes differ"]]
     path = ""
@@ -100,6 +105,8 @@ def table(study: Study) -> str:
         numbers = [record.clamp_force[0, 0], record.clamp_force[1, 1], *record.currents, record.fit.Ry, record.fit.Rc]
         rows.append([record.name, *(f"{number:#.4g}" for number in numbers)])
         rows[-1] += [str(record.iterations), f"{difference(record):.1e}"]
+        if (error := study.error_of(record.name)) is not None:
+            rows.append(["  estimated error", *(_percent(quantity.relative) for quantity in error.quantities), "", ""])
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
         "  ".join(
@@ -107,7 +114,8 @@ def table(study: Study) -> str:
         ).rstrip()
         for row in rows
     ]
-    return "\n".join([*lines, "", *effort(study), *ngspice_statement(study)])
+    warnings = [f"Error estimate of {error.state}: {text}." for error in study.errors for text in error.warnings]
+    return "\n".join([*lines, "", *effort(study), *warnings, *ngspice_statement(study)])
 
 
 def effort(study: Study) -> tuple[str, ...]:
@@ -125,6 +133,10 @@ def effort(study: Study) -> tuple[str, ...]:
     if halved:
         sentences.append(f"Increments too large to converge as a whole were halved: {', '.join(halved)}.")
     return tuple(sentences)
+
+
+def _percent(share: float) -> str:
+    return f"±{100 * share:.2g} %" if math.isfinite(share) else "not known"
 
 
 def ngspice_statement(study: Study) -> tuple[str, ...]:
@@ -203,7 +215,7 @@ def insulated_resistance(mesh: FibrilMesh) -> float:
     return float(np.mean(1.0 / (conductance * np.maximum(crossings, 1))[conducts])) if conducts.any() else math.inf
 
 
-def _state(record: Record) -> dict[str, Any]:
+def _state(record: Record, error: ErrorEstimate | None) -> dict[str, Any]:
     verification = record.verification
     return {
         "name": record.name,
@@ -223,6 +235,7 @@ def _state(record: Record) -> dict[str, Any]:
         "contact_points": record.contacts.n_contacts,
         "levels": record.levels,
         "netlist": record.netlist,
+        "error_estimate": None if error is None else _error_estimate(error),
         "verification": {
             "routes": verification.routes,
             "max_voltage_difference_V": verification.max_voltage_difference,
@@ -236,6 +249,31 @@ def _state(record: Record) -> dict[str, Any]:
             "confirmed": confirmed(record),
             "note": verification.note,
         },
+    }
+
+
+def _error_estimate(error: ErrorEstimate) -> dict[str, Any]:
+    return {
+        "elements": error.elements,
+        "contact_points": error.contact_points,
+        "moved_mm": error.moved,
+        "warnings": error.warnings,
+        "quantities": [
+            {
+                "name": quantity.name,
+                "unit": quantity.unit,
+                "value": quantity.value,
+                "error": quantity.absolute,
+                "relative_error": quantity.relative,
+                "mesh_error": quantity.mesh,
+                "contact_error": quantity.contact,
+                "order": quantity.order,
+                "coarse": quantity.coarse,
+                "fine": quantity.fine,
+                "more_points": quantity.more_points,
+            }
+            for quantity in error.quantities
+        ],
     }
 
 

@@ -51,7 +51,7 @@ ALLOWED: dict[str, set[str]] = {
     "transfer": {"geometry.mesh", "mech.configuration"},
     "error_estimate": {
         *{"design", "geometry", "mech", "contact", "relaxation", "fields", "fit", "results"},
-        *{"discretisation", "transfer"},
+        *{"discretisation", "transfer", "workers"},
     },
     "results": RESULT_TYPES,
     "store": {*RESULT_TYPES, "results"},
@@ -73,7 +73,7 @@ ALLOWED: dict[str, set[str]] = {
     "schedule": {"mech.configuration", "mech.linear", "increment", "plan", "record", "results", "workers"},
     "study": {
         *{"design", "geometry.weave", "mech.configuration", "mech.linear"},
-        *{"folder", "lock", "plan", "record", "results", "schedule", "workers"},
+        *{"discretisation", "error_estimate", "folder", "lock", "plan", "record", "results", "schedule", "workers"},
     },
 }
 ANYTHING = {"cli", "__main__"}  # the command line, which nobody imports

@@ -64,6 +64,7 @@ $figure_temperatures
 currents of each state.</p>
 $figure_network
 $network
+$errors
 $claims
 <h2>Verification</h2>
 <p>Finite elements, a nodal solution of the netlist's circuit and ngspice solve the same network independently of one

@@ -16,7 +16,10 @@ from circuittex.claims.table import Table, claims_table
 from circuittex.plot import save_figures
 from circuittex.report.captions import captions
 from circuittex.report.claims import claims_section
+from circuittex.report.errors import error_section
 from circuittex.report.frame import PAGE
+from circuittex.report.table import number as _number
+from circuittex.report.table import table as _table
 from circuittex.results import Record, Study
 from circuittex.summary import agrees, confirmed, difference, effort, insulated_resistance, ngspice_statement
 from circuittex.verify import AGREEMENT
@@ -48,6 +51,7 @@ def page(study: Study, pictures: Mapping[str, bytes], beside: Sequence[Study] = 
         states=_states(study),
         network=_network(study),
         claims=claims_section(claims),
+        errors=error_section(study.errors),
         verification=_verification(study),
         parameters=_parameters(study),
         version=escape(study.version),
@@ -61,20 +65,6 @@ def _figure(caption: str, png: bytes | None) -> str:
     caption = escape(caption)
     image = f'<img alt="{caption}" src="data:image/png;base64,{data}">'
     return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """An HTML table; the first column names the row. All texts are escaped here."""
-    top = "".join(f'<th scope="col">{escape(text)}</th>' for text in head)
-    body = "".join(
-        f'<tr><th scope="row">{escape(row[0])}</th>' + "".join(f"<td>{escape(text)}</td>" for text in row[1:]) + "</tr>"
-        for row in rows
-    )
-    return f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
-
-
-def _number(value: float, digits: int = 4) -> str:
-    return f"{value:.{digits}g}" if value == value else "–"
 
 
 def _facts(study: Study, claims: Table | None) -> str:

@@ -1,0 +1,180 @@
+"""The discretisation error of a recorded state: the same equilibrium on other meshes and with more contact points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from math import nan
+
+import numpy as np
+
+from circuittex.contact.extract import contacts_of
+from circuittex.design import Design
+from circuittex.discretisation import ErrorEstimate, QuantityError
+from circuittex.errors import CircuittexError, ConvergenceError, DesignError
+from circuittex.fields import solve_probes
+from circuittex.fit import Fit, fit_network
+from circuittex.frozen import frozen
+from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.geometry.weave import build_mesh
+from circuittex.mech.configuration import Configuration
+from circuittex.mech.linear import LinearSolver, best_solver
+from circuittex.relaxation import clamp_force, relax
+from circuittex.results import Record, Study
+from circuittex.transfer import transfer
+from circuittex.workers import Computers
+
+VARIANTS = ("half as many elements", "twice as many elements", "twice as many contact points")
+"""How the numerics of a design are varied, in the order of `variants`."""
+JUMP = 2 / 3
+"""Parts of the smallest radius: where a node lies further than this from its place in the state, fibrils have
+rearranged. Discretisation alone was seen to move nodes by half a radius on four quadratic elements a fibril, and by a
+quarter on more; a fibril that rolls over another moves by about one."""
+
+
+@frozen
+class _Repeat:
+    """What one variant of the numerics says about a state; all nan where it has no equilibrium."""
+
+    values: Floats
+    """(n,) clamp forces N, probe currents A, Ry and Rc ohm."""
+    moved: float
+    """Largest distance of a node from its place in the state, mm."""
+    trouble: str
+    """Why there is no equilibrium; empty where there is."""
+
+
+def variants(design: Design) -> tuple[Design, Design, Design]:
+    """The design on half and on twice as many elements, and with twice as many contact points.
+
+    Raises `DesignError` where its numerics leave no room for one of them.
+
+    >>> from circuittex.design import plain_weave
+    >>> [(d.numerics.elements, d.numerics.contact_points) for d in variants(plain_weave())]
+    [(10, 4), (40, 4), (20, 8)]
+    """
+    elements, points = design.numerics.elements, design.numerics.contact_points
+    if elements % 2:
+        raise DesignError("numerics.elements", elements, "an error estimate halves it: it must be even")
+    coarse, fine = (_varied(design, "elements", n) for n in (elements // 2, 2 * elements))
+    return coarse, fine, _varied(design, "contact_points", 2 * points)
+
+
+def _varied(design: Design, field: str, number: int) -> Design:
+    # Snapping is about netlists, which are not written here, and its limit depends on the mesh.
+    try:
+        return replace(design, numerics=replace(design.numerics, snap_length=0.0, **{field: number}))
+    except DesignError as error:
+        own = getattr(design.numerics, field)
+        reason = f"an error estimate computes the design with {number} as well, which fails: {error.allowed}"
+        raise DesignError(f"numerics.{field}", own, reason) from error
+
+
+def estimate_error(
+    design: Design,
+    mesh: FibrilMesh,
+    record: Record,
+    solver: Callable[[], LinearSolver] = best_solver,
+    say: Callable[[str], None] | None = None,
+) -> ErrorEstimate:
+    """The discretisation error of clamp forces, probe currents, Ry and Rc of a recorded state.
+
+    The equilibrium found is carried over to each variant of the numerics and relaxed from there, so that it stays on
+    its branch: several equilibria of a weave lie close together, and a relaxation from the start could find another.
+    A variant without equilibrium, or one in which fibrils rearranged, is named in the `warnings`. `solver` makes the
+    linear solver of each relaxation; `say` is told what is being done.
+
+    Raises `DesignError` as `variants` does.
+    """
+    free = next((loading.free for loading in design.loading if loading.name == record.path), "")
+    repeats = []
+    for words, other in zip(VARIANTS, variants(design), strict=True):
+        if say is not None:
+            say(f"{record.name}: error estimate, {words}")
+        repeats.append(_repeat(other, mesh, record.configuration, free, solver()))
+    own = _values(record.clamp_force, record.currents, record.fit)
+    rows = zip(_names(design), own, *(repeat.values for repeat in repeats), strict=True)
+    elements, points = design.numerics.elements, design.numerics.contact_points
+    return ErrorEstimate(
+        state=record.name,
+        elements=(elements // 2, elements, 2 * elements),
+        contact_points=(points, 2 * points),
+        moved=np.array([repeat.moved for repeat in repeats]),
+        quantities=tuple(QuantityError(*name, *map(float, values)) for name, *values in rows),
+        warnings=tuple(_warnings(mesh, repeats)),
+    )
+
+
+def without_estimate(study: Study) -> tuple[Record, ...]:
+    """The states that an error estimate is for and that have none yet: the relaxed one and the last of each path."""
+    last = {record.path: record for record in study.records}  # one each: the relaxed state's path is empty
+    known = {estimate.state for estimate in study.errors}
+    return tuple(record for record in last.values() if record.name not in known)
+
+
+def estimate_errors(
+    study: Study,
+    computers: Computers,
+    solver: Callable[[], LinearSolver],
+    keep: Callable[[Study, ErrorEstimate], Study],
+) -> Study:
+    """The study with an estimate for each state that `without_estimate` names; those that it has stay.
+
+    `keep` adds an estimate to the study; it is called for each new one as it comes. In the study they are in the order
+    of their states.
+
+    Raises, before anything is computed, the `DesignError` of `variants`; the error of an estimate that fails.
+    """
+    variants(study.design)
+    waiting = list(without_estimate(study))
+    running = 0
+    while waiting or running:
+        while waiting and running < computers.size:
+            record = waiting.pop(0)
+            computers.submit(record.name, estimate_error, study.design, study.mesh, record, solver)
+            running += 1
+        _, result = computers.next()
+        running -= 1
+        if isinstance(result, CircuittexError):
+            raise result
+        study = keep(study, result)
+    rank = {record.name: number for number, record in enumerate(study.records)}
+    return replace(study, errors=tuple(sorted(study.errors, key=lambda estimate: rank[estimate.state])))
+
+
+def _repeat(design: Design, mesh: FibrilMesh, state: Configuration, free: str, solver: LinearSolver) -> _Repeat:
+    """Relax the state with the numerics of `design`, and measure what comes out."""
+    other = build_mesh(design)
+    try:
+        found = relax(other, design, transfer(state, mesh, other), free=free, solver=solver)
+    except ConvergenceError as error:
+        return _Repeat(np.full(len(_names(design)), nan), nan, str(error))
+    contacts = contacts_of(design, other, found.configuration)
+    fields = solve_probes(contacts, design.terminals, design.probes, contact_heat=design.electrical.contact_heat)
+    back = transfer(found.configuration, other, mesh)
+    moved = float(np.linalg.norm(back.r - state.r, axis=1).max())
+    currents = [float(field.currents[0]) for field in fields]
+    return _Repeat(_values(clamp_force(other, found.reaction), currents, fit_network(currents, design)), moved, "")
+
+
+def _names(design: Design) -> tuple[tuple[str, str], ...]:
+    """Name and unit of each quantity, in the order of `_values`."""
+    currents = [(f"I {probe.name}", "A") for probe in design.probes]
+    return ("Fx warp", "N"), ("Fy weft", "N"), *currents, ("Ry", "ohm"), ("Rc", "ohm")
+
+
+def _values(force: Floats, currents: Sequence[float], fit: Fit) -> Floats:
+    """(n,) the quantities: clamp force of the warp along x and of the weft along y, probe currents, Ry, Rc."""
+    return np.array([force[0, 0], force[1, 1], *currents, fit.Ry, fit.Rc])
+
+
+def _warnings(mesh: FibrilMesh, repeats: Sequence[_Repeat]) -> Iterator[str]:
+    limit = JUMP * float(mesh.radius.min())
+    for words, repeat in zip(VARIANTS, repeats, strict=True):
+        if repeat.trouble:
+            yield f"with {words} there is no equilibrium near the state ({repeat.trouble})"
+        elif repeat.moved > limit:
+            yield (
+                f"with {words} fibrils rearrange, by up to {repeat.moved:.2g} mm: that equilibrium is another branch, "
+                "and the estimate holds the difference of branches besides that of meshes"
+            )

@@ -34,6 +34,7 @@ ALLOWED: dict[str, set[str]] = {
     "contact": {"mech.configuration", "mech.terms", "mech.pattern", "mech.space", "geometry", "design"},
     "relaxation": {"design", "geometry", "mech", "contact"},
     "increment": {"design", "geometry", "mech", "relaxation"},
+    "work": {"geometry.mesh", "relaxation"},
     "fields": {*STATE, "design"},
     "spice_names": set(),
     "feet": {*STATE, "spice_names"},

@@ -1,4 +1,4 @@
-"""The command line: new, run, netlist, verify, report."""
+"""The command line: new, run, netlist, verify, report, ensemble."""
 
 from __future__ import annotations
 
@@ -180,12 +180,26 @@ def _beside(options: argparse.Namespace, study: Study) -> tuple[Study, ...]:
     return (other,)
 
 
+def _ensemble(options: argparse.Namespace) -> int:
+    from circuittex.ensemble.command import closing_words, ensemble_command, folder_of, warnings
+
+    _prepare(folder_of(options))
+    with Progress(sys.stderr, show=not options.quiet) as progress:
+        ensemble = ensemble_command(options, progress)
+    if not options.quiet:
+        print(closing_words(ensemble, folder_of(options)))
+    for line in warnings(ensemble):
+        print("circuittex:", line, file=sys.stderr)
+    return DISAGREE if any(ensemble.disagreeing) else 0
+
+
 COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "new": _new,
     "run": _run,
     "netlist": _netlist,
     "verify": _verify,
     "report": _report,
+    "ensemble": _ensemble,
 }
 
 
@@ -259,6 +273,8 @@ def _select(study: Study, name: str | None) -> tuple[Record, ...]:
 
 def _kept(options: argparse.Namespace) -> str:
     """What an interrupted command leaves behind, in words."""
+    if options.command == "ensemble":
+        return "finished members and states are kept; the same command goes on from there"
     if options.command != "run":
         return "results that were there before are unchanged"
     try:

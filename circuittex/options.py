@@ -37,6 +37,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_netlist(commands)
     _add_verify(commands)
     _add_report(commands)
+    _add_ensemble(commands)
     return parser
 
 
@@ -167,6 +168,34 @@ def _add_report(commands: Commands) -> None:
         help="results of the paper's cell with the other parameter set: they get a column of their own in the table "
         "that compares the paper's claims with what is found",
     )
+
+
+def _add_ensemble(commands: Commands) -> None:
+    parser = _command(
+        commands,
+        "ensemble",
+        "compute many random packings of a design, and the spread of its results",
+        "Computes members that differ from DESIGN by small random offsets of the fibrils, twists of the yarns and\n"
+        "shifts of their waves: as the [packing] table of DESIGN says, or moving fibrils by 5 % of their radius.\n"
+        "Leaves in DIR: the median and percentile bands of forces, currents, Ry and Rc against strain as\n"
+        "ensemble.html, ensemble.csv and ensemble.json, and each member's study in members/NUMBER. Needs the\n"
+        "extra 'circuittex[ensemble]'. However it ends, the same command goes on; it may ask for more members.",
+        "circuittex ensemble examples/plain_weave.toml --members 32",
+    )
+    parser.add_argument("design", metavar="DESIGN", type=Path, help="design file (TOML); see 'circuittex new'")
+    parser.add_argument("--members", metavar="N", type=int, required=True, help="how many packings")
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, help="folder of the results (default: results/NAME-ensemble)"
+    )
+    parser.add_argument("--seed", metavar="S", type=int, help="of the ensemble (default: the one in [packing], or 0)")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--workers", metavar="W", type=int, help="processes on this machine (default: its cores)")
+    where.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="a running Dask scheduler, such as tcp://node1:8786; its workers need circuittex and must share DIR",
+    )
+    parser.add_argument("--quiet", action="store_true", help="show no progress and no closing table")
 
 
 def _add_results(parser: argparse.ArgumentParser) -> None:

@@ -72,6 +72,10 @@ ALLOWED: dict[str, set[str]] = {
     },
     "folder": {"discretisation", "export", "results", *OUTPUTS},
     "schedule": {"mech.configuration", "mech.linear", "increment", "plan", "record", "results", "workers"},
+    "ensemble": {
+        *{"design", "geometry", "folder", "lock", "plan", "plot.style", "report.frame", "report.table", "results"},
+        *{"store", "study", "summary"},
+    },
     "study": {
         *{"design", "geometry.weave", "mech.configuration", "mech.linear"},
         *{"discretisation", "error_estimate", "folder", "lock", "plan", "record", "results", "schedule", "workers"},
@@ -90,7 +94,9 @@ LIBRARIES: dict[str, set[str]] = {
     "h5py": {"store"},
     "filelock": {"lock"},
     "meshio": {"vtu"},
-    "matplotlib": {"plot"},
+    "matplotlib": {"plot", "ensemble"},
+    "distributed": {"ensemble"},
+    "dask": {"ensemble"},
 }
 
 
@@ -199,7 +205,7 @@ def test_library_is_known_only_where_it_belongs(library: str) -> None:
     assert users <= LIBRARIES[library]
 
 
-HEAVY = ["numpy", "scipy", "numba", "skfem", "matplotlib", "PySpice", "networkx", "h5py", "meshio", "pypardiso"]
+HEAVY = ["numpy", "scipy", "numba", "skfem", "matplotlib", "PySpice", "networkx", "h5py", "meshio", "pypardiso", "dask"]
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from circuittex.design.experiment import (
 )
 from circuittex.design.fabric import ContactLaw, Material, Weave, Yarn
 from circuittex.design.files import load_design, parse_design, starter
+from circuittex.design.packing import Packing
 from circuittex.design.paper import plain_weave
 from circuittex.design.statement import Design, Electrical, Numerics, design_hash
 
@@ -24,6 +25,7 @@ __all__ = [
     "Loading",
     "Material",
     "Numerics",
+    "Packing",
     "Probe",
     "Terminal",
     "Weave",

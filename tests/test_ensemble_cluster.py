@@ -1,0 +1,177 @@
+"""Ensembles on Dask: workers that die, tasks that fail, schedulers that are running already.
+
+Starting worker processes takes seconds: one test has them, for all that may happen to them. The other tests have their
+worker in this process.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import distributed
+import numpy as np
+import pytest
+
+import circuittex.ensemble.cluster as cluster_module
+from circuittex.design import plain_weave
+from circuittex.ensemble import run_ensemble
+from circuittex.ensemble.cluster import each_result, local_client, remote_client
+from circuittex.ensemble.perturbation import member_design, perturbed
+from circuittex.errors import CircuittexError, DesignError
+from circuittex.geometry.mesh import Floats
+from circuittex.lock import HOLDER
+from circuittex.study import run_study
+
+TINY = plain_weave(yarns=2, rows=(1,))
+TINY = replace(TINY, numerics=replace(TINY.numerics, elements=3), probes=(), terminals=())
+
+
+def task(kind: str, log: str) -> str:
+    """What a worker may do to its scheduler; every attempt leaves a line in `log`."""
+    with Path(log).open("a") as file:
+        file.write(f"{kind} {os.getpid()}\n")
+    attempts = Path(log).read_text().count(kind)
+    if kind == "dies once" and attempts == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if kind == "raises":
+        raise OSError("no space left")
+    if kind == "threads":
+        return os.environ["NUMBA_NUM_THREADS"] + os.environ["OMP_NUM_THREADS"]
+    return f"{kind} {attempts}"
+
+
+def alive(pid: int) -> bool:
+    """Whether a process is there and no zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def never_ends(log: str) -> None:
+    Path(log).write_text(str(os.getpid()))
+    while True:
+        time.sleep(0.1)
+
+
+def test_whatever_happens_to_workers_and_tasks_the_others_go_on(tmp_path: Path) -> None:
+    """Tasks that kill their process, raise, or never end; and a member whose process is killed from outside."""
+    kinds = ["returns", "dies once", "raises", "threads"]
+    arguments = {kind: (kind, str(tmp_path / kind)) for kind in kinds}
+    endless = tmp_path / "endless"
+    with local_client(1) as client:
+        found = dict(each_result(client, task, arguments))
+        assert set(found) == set(kinds)
+        assert found["dies once"] == "dies once 2"
+        assert found["returns"] in ("returns 1", "returns 2")  # lost with its worker, it is computed again
+        assert found["threads"] == "11"
+        assert isinstance(found["raises"], OSError)
+        assert (tmp_path / "raises").read_text().count("raises") == 3
+
+        values, killed = killed_member(client.scheduler.address, tmp_path / "e")
+        assert killed != os.getpid()
+
+        # what is still going on when the block is left ends with it
+        client.submit(never_ends, str(endless), pure=False)
+        while not (endless.exists() and endless.read_text()):
+            time.sleep(0.05)
+        pid = int(endless.read_text())
+        assert alive(pid)
+    assert not alive(pid)
+    assert not alive(killed)
+    record = run_study(member_design(perturbed(TINY), 0), workers=1).records[0]
+    # relaxed to 1e-6 N; the number of threads, and hence the rounding, may differ between the processes
+    np.testing.assert_allclose(values, record.clamp_force.ravel(), rtol=0, atol=1e-6)
+
+
+def killed_member(address: str, out: Path) -> tuple[Floats, int]:
+    """The values of a member whose process is killed once while it computes, and the number of that process."""
+    killed: list[int] = []
+
+    def kill() -> None:
+        holder = out / "members" / "0000" / HOLDER
+        while not killed and not stop.is_set():
+            with suppress(OSError, IndexError, ValueError):
+                pid = int(holder.read_text().split()[1])
+                os.kill(pid, signal.SIGKILL)
+                killed.append(pid)
+            stop.wait(0.01)
+
+    stop = threading.Event()
+    killer = threading.Thread(target=kill)
+    killer.start()
+    try:
+        ensemble = run_ensemble(TINY, out, members=1, address=address)
+    finally:
+        stop.set()
+        killer.join()
+    assert ensemble.failures == ("",)
+    (pid,) = killed
+    return ensemble.values[0, 0], pid
+
+
+@pytest.fixture(scope="module")
+def scheduler() -> Iterator[str]:
+    """The address of a scheduler with a worker in this process."""
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0", memory_limit=None
+    ) as cluster:
+        yield cluster.scheduler_address
+
+
+def test_members_run_on_a_scheduler_that_is_there(
+    scheduler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(design: object, folder: Path, **_: object) -> None:
+        raise DesignError("packing.seed", threading.current_thread().name, "nothing")
+
+    monkeypatch.setattr("circuittex.ensemble.member.run_study", refuse)
+    ensemble = run_ensemble(TINY, tmp_path, members=2, address=scheduler)
+    assert all("Dask" in failure for failure in ensemble.failures)
+    assert not list(tmp_path.glob(".seen-by-*"))
+
+
+def test_workers_that_do_not_see_the_folder_are_named(
+    scheduler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster_module, "sees", lambda path: False)
+    with (
+        pytest.raises(
+            DesignError, match=r"results folder: .* must be a folder that all workers share; the worker at inproc"
+        ),
+        remote_client(scheduler, tmp_path),
+    ):
+        pass
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://a", "127.0.0.1:x"])
+def test_an_address_where_nobody_answers_is_named(
+    address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster_module, "PATIENCE", 0.5)
+    with pytest.raises(DesignError, match=r"--scheduler.*no Dask scheduler answers"):
+        run_ensemble(TINY, tmp_path, members=1, address=address)
+
+
+def test_a_scheduler_without_workers_is_told_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster_module, "PATIENCE", 0.5)
+    with (
+        distributed.LocalCluster(n_workers=0, processes=False, dashboard_address="127.0.0.1:0") as cluster,
+        pytest.raises(DesignError, match="no worker has joined"),
+        remote_client(cluster.scheduler_address, tmp_path),
+    ):
+        pass
+
+
+def test_without_dask_the_message_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(CircuittexError, match=r"pip install 'circuittex\[ensemble\]'"), local_client(1):
+        pass

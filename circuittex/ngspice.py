@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import math
 import os
 import re
@@ -31,6 +32,9 @@ TROUBLE = re.compile(
 """What ngspice says only where its answer must not be used; a sound circuit of resistors makes it say none."""
 
 LOG_CHARACTERS = 100_000
+
+ROOM = 1_000_000
+"""Bytes: where less is free for ngspice's files, its failure is the disk's."""
 
 
 @frozen
@@ -122,7 +126,8 @@ def run_decks(decks: Sequence[str], timeout: float = 60.0) -> tuple[RawData, ...
     no answer; so the log must be free of complaints and every raw file complete and finite.
 
     Raises NgspiceError where ngspice is missing, is not feasible for decks of this size in that time,
-    complains, crashes, hangs, or answers rubbish.
+    complains, crashes, hangs, or answers rubbish; OSError where the disk with the temporary folder is full, which says
+    nothing about ngspice and passes.
     """
     executable = find_ngspice()
     if executable is None:
@@ -130,8 +135,15 @@ def run_decks(decks: Sequence[str], timeout: float = 60.0) -> tuple[RawData, ...
     _check_size(decks, timeout)
     try:
         with tempfile.TemporaryDirectory(prefix="circuittex-", ignore_cleanup_errors=True) as folder:
-            return _run(executable, decks, Path(folder), timeout)
+            try:
+                return _run(executable, decks, Path(folder), timeout)
+            except NgspiceError as error:
+                if shutil.disk_usage(folder).free < ROOM:
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), folder) from error
+                raise
     except OSError as error:
+        if error.errno == errno.ENOSPC:
+            raise
         raise NgspiceError(f"ngspice could not be run: {error}") from error
 
 

@@ -3,18 +3,33 @@
 from __future__ import annotations
 
 import importlib
+import json
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from circuittex.circuit import reduced_circuit
 from circuittex.design import Design, plain_weave
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
-SCRIPTS = ["assembly", "compile", "mesh_study", "netlist", "network", "newton", "paper_tables"]
+SCRIPTS = [
+    "algorithm1",
+    "assembly",
+    "compile",
+    "dolfinx_beam",
+    "kills",
+    "mesh_study",
+    "netlist",
+    "network",
+    "newton",
+    "paper_tables",
+    "scaling",
+    "table",
+]
 ROUND_OFF = 1e-12
 """Relative difference of two routes to the same numbers, summed in different orders."""
 
@@ -43,7 +58,7 @@ def test_script_explains_itself(name: str, monkeypatch: pytest.MonkeyPatch, caps
 
 
 def test_every_script_is_known_here() -> None:
-    helpers = {"measure", "woven"}
+    helpers = {"dolfinx_worker", "measure", "watch", "woven"}
     assert {path.stem for path in FOLDER.glob("*.py")} == {*SCRIPTS, *helpers}
 
 
@@ -113,26 +128,24 @@ def test_small_study_is_sound() -> None:
 
 def test_newton_reports_every_part_and_solver() -> None:
     newton = script("newton")
-    head, title, parts, _, solvers = newton.report(tiny(), iterations=2, repeats=1)
-    assert "contact points" in head
-    assert title.startswith("2 iterations")
-    for part in (newton.CLOSEST, newton.ENERGY, newton.BEAM, newton.CONTACT, newton.SOLVE):
-        assert part in parts
-    names = [line.split("|")[1].strip() for line in solvers.split("\n")[2:]]
-    assert names == [solver.name for solver in newton.installed()]
+    parts, solvers = newton.report(tiny(), iterations=2, repeats=1)
+    assert parts.title.startswith("2 iterations")
+    assert "contact points" in parts.title
+    assert {newton.CLOSEST, newton.ENERGY, newton.BEAM, newton.CONTACT, newton.SOLVE} < {row[0] for row in parts.rows}
+    assert [row[0] for row in solvers.rows] == [solver.name for solver in newton.installed()]
 
 
 def test_stopwatch_misses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a clock that ticks once a look, an iteration's parts and its rest fill the time between two reports."""
-    newton = script("newton")
+    module = script("watch")
     ticks = iter(map(float, range(100)))
-    monkeypatch.setattr(newton.time, "perf_counter", lambda: next(ticks))
-    watch = newton.Stopwatch()
+    monkeypatch.setattr(module.time, "perf_counter", lambda: next(ticks))
+    watch = module.Stopwatch()
     watch.report(0, 1.0)  # looks at 0
-    watch.add(newton.BEAM, newton.time.perf_counter())  # from 1 to 2
+    watch.add(module.BEAM, module.time.perf_counter())  # from 1 to 2
     watch.report(1, 0.5)  # looks at 3
-    assert watch.per_iteration(newton.BEAM).tolist() == [1.0]
-    assert watch.per_iteration(*newton.PARTS).tolist() == [3.0]
+    assert watch.per_iteration(module.BEAM).tolist() == [1.0]
+    assert watch.per_iteration(*module.PARTS).tolist() == [3.0]
 
 
 def test_finer_mesh_starts_on_the_coarse_state() -> None:
@@ -147,3 +160,102 @@ def test_finer_mesh_starts_on_the_coarse_state() -> None:
     np.testing.assert_allclose(fine.r[ends], start.r[ends], atol=1e-12)
     step = np.linalg.norm(np.diff(fine.r.reshape(mesh.n_fibrils, -1, 3), axis=1), axis=2)
     assert step.max() < 1.5 * step.min()  # evenly spaced but for the strain: no node is in another's place
+
+
+def test_results_are_kept_with_their_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    measure, kept = script("measure"), tmp_path / "new" / "kept.json"
+    monkeypatch.setattr("sys.argv", ["/somewhere/speed.py", "--repeats", "2", "--json", str(kept), "--size", "4"])
+    parser = measure.arguments("What it costs.")
+    parser.add_argument("--repeats")
+    parser.add_argument("--size")
+    measure.publish(parser.parse_args(), [measure.Table("Costs:", ["a", "b"], [["x", np.float64(0.5)], ["y", 2]])])
+    result = json.loads(kept.read_text())
+    assert result["command"] == "python benchmarks/speed.py --repeats 2 --size 4"
+    assert result["tables"] == [{"title": "Costs:", "head": ["a", "b"], "rows": [["x", 0.5], ["y", 2]]}]
+    assert result["machine"] == measure.machine()
+
+
+def test_page_gets_the_tables_for_which_there_are_results(tmp_path: Path) -> None:
+    result = {"command": "python x", "date": "today", "machine": "here", "tables": []}
+    table = {"title": "Costs:", "head": ["a"], "rows": [[0.123456]]}
+    (tmp_path / "one.json").write_text(json.dumps({**result, "tables": [table]}))
+    page = "# Title\n\n<!-- one -->\nold\n<!-- end one -->\n\ntext\n\n<!-- two -->\nkept\n<!-- end two -->\n"
+    new = script("table").rewritten(page, tmp_path)
+    one = "<!-- one -->\n\n`python x`, today, here.\n\nCosts:\n\n| a |\n|---|\n| 0.123 |\n\n<!-- end one -->"
+    assert new == page.replace("<!-- one -->\nold\n<!-- end one -->", one)
+    assert script("table").rewritten(new, tmp_path) == new
+
+
+def test_every_section_of_the_page_is_a_benchmark_with_results() -> None:
+    table = script("table")
+    sections = [match["name"] for match in table.SECTION.finditer(table.PAGE.read_text())]
+    assert sorted(sections) == sorted(path.stem for path in table.MEASURED.glob("*.json"))
+    assert table.rewritten(table.PAGE.read_text(), table.MEASURED) == table.PAGE.read_text()
+
+
+def test_scaling_measures_a_size_and_compares_two() -> None:
+    scaling = script("scaling")
+    small = scaling.measured(1, per_crossing=4, iterations=2)
+    assert (small["fibrils"], small["elements"], small["iterations"]) == (20, 80, 2)
+    assert sum(small["shares"].values()) == pytest.approx(100)
+    assert small["memory"] > 50  # MB: Python with NumPy and SciPy alone
+    large = {**small, "yarns": 2, "elements": 8 * 80, "seconds": 64 * small["seconds"]}
+    costs, shares = scaling.tables([small, large])
+    assert len(costs.rows[0]) == len(scaling.HEAD)
+    assert costs.rows[0][-3:] == ["", "", ""]
+    assert costs.rows[1][-3:] == pytest.approx([2, 0, 0])
+    assert shares.head == ["part", "1 x 1", "2 x 2"]
+
+
+def test_algorithm_1_comes_to_rest_in_the_equilibrium() -> None:
+    """Backward Euler step by step and the relaxation are two ways to one minimum of the potential."""
+    algorithm1 = script("algorithm1")
+    mesh, design = algorithm1.small_cell()
+    (cells, seconds, sign), *others = algorithm1.marched(mesh, design, dt=1e-3, steps=500)
+    assert (cells[0], sign, others) == ("Algorithm 1", "", [])
+    assert seconds > 0
+    assert cells[4] <= design.numerics.tolerance
+    assert cells[5] == pytest.approx(algorithm1.relax(mesh, design).energy, rel=1e-5)
+
+
+def test_algorithm_1_cut_short_gives_a_bound_and_an_estimate() -> None:
+    algorithm1 = script("algorithm1")
+    (bound, seconds, more), (estimate, longer, about) = algorithm1.marched(*algorithm1.small_cell(), dt=1e-4, steps=30)
+    assert (bound[2], more, about) == ("> 30", "> ", "~ ")
+    assert int(estimate[2].removeprefix("~ ")) > 30
+    assert longer > seconds
+
+
+def test_steps_needed_follow_the_decay() -> None:
+    algorithm1 = script("algorithm1")
+    assert algorithm1.steps_needed(10.0 ** -np.arange(5), 1e-7) == 8
+    assert algorithm1.steps_needed(np.array([1.0, 2.0]), 1e-7) is None
+
+
+def test_answers_of_dolfinx_are_compared_in_its_own_numbering() -> None:
+    dolfinx_beam = script("dolfinx_beam")
+    design = plain_weave(yarns=1, rows=(1,))
+    ours = dolfinx_beam.Ours(replace(design, numerics=replace(design.numerics, elements=2)))
+    ours.assemble()
+    node = np.random.default_rng(0).permutation(ours.space.mesh.n_nodes)
+    at = (9 * ours.space.slot[node][:, None] + np.arange(9)).ravel()
+    n = len(ours.q)
+    upper = sp.csr_array((ours.data, ours.pattern.indices, ours.pattern.indptr), shape=(n, n)).toarray()
+    tangent = sp.csr_array((upper + np.triu(upper, 1).T)[np.ix_(at, at)])
+    answer = {"node": node, "gradient": ours.gradient[at].copy()}
+    answer |= {"value": tangent.data, "column": tangent.indices, "start": tangent.indptr}
+    assert ours.differences(answer) == (0.0, 0.0)
+    answer["gradient"][0] += np.abs(ours.gradient).max()
+    assert ours.differences(answer)[0] == pytest.approx(1.0)
+
+
+def test_without_dolfinx_there_is_a_hint(tmp_path: Path) -> None:
+    dolfinx_beam = script("dolfinx_beam")
+    python = tmp_path / "python"
+    python.write_text("#!/bin/sh\nexit 1\n")
+    python.chmod(0o755)
+    with (
+        pytest.raises(SystemExit, match="apt-get install python3-dolfinx"),
+        dolfinx_beam.dolfinx(str(python), tmp_path),
+    ):
+        pass

@@ -20,6 +20,7 @@ from circuittex.circuit import CONTACT, Circuit
 from circuittex.cli import Progress, main
 from circuittex.design import Design, load_design, starter
 from circuittex.errors import ConvergenceError
+from circuittex.lock import locked
 from circuittex.netlist import parse, pin_names
 from circuittex.nodal import NodalSolution, solve_nodal
 from circuittex.results import Study
@@ -185,6 +186,24 @@ def test_run_without_probes_has_nothing_to_disagree_about(
     assert main(["run", str(design_file), "--out", str(tmp_path / "out"), "--quiet"]) == 0
 
 
+@pytest.mark.parametrize("workers", ["0", "-2"])
+def test_run_needs_a_worker(
+    workers: str, design_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", str(design_file), "--out", str(tmp_path / "out"), "--workers", workers, "--quiet"]) == 2
+    assert f"workers: {workers} is not usable" in error_line(capsys)
+
+
+def test_run_passes_its_options_on(design_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[str, object] = {}
+    replace_study(monkeypatch, lambda *_, **options: (given.update(options), synthetic_study(1))[1])
+    command = ["run", str(design_file), "--out", str(tmp_path / "out"), "--quiet"]
+    assert main(command) == 0
+    assert (given["fresh"], given["workers"]) == (False, None)
+    assert main([*command, "--fresh", "--workers", "3"]) == 0
+    assert (given["fresh"], given["workers"]) == (True, 3)
+
+
 def test_run_refuses_a_file_as_folder(design_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", str(design_file), "--out", str(design_file)]) == 2
     line = error_line(capsys)
@@ -294,8 +313,18 @@ def test_progress_is_plain_lines_elsewhere() -> None:
     stream = io.StringIO()
     with Progress(stream) as progress:
         progress("first")
-        progress("second")
+        progress("second\n")
     assert stream.getvalue() == "first\nsecond\n"
+
+
+def test_what_ends_with_a_line_break_stays_on_the_terminal() -> None:
+    stream = Terminal()
+    with Progress(stream) as progress:
+        progress("first")
+        progress("3 of 21 states are there already\n")
+        progress("second")
+    start = "\r\x1b[2K"
+    assert stream.getvalue() == f"{start}first{start}3 of 21 states are there already\n{start}second{start}"
 
 
 # netlist, verify, report
@@ -333,6 +362,15 @@ def test_report_is_rebuilt_from_the_file_alone(
     assert "stretch-0.0250" in (computed / "report.html").read_text(encoding="utf-8")
     states = json.loads((computed / "summary.json").read_text(encoding="utf-8"))["states"]
     assert [state["name"] for state in states] == ["relaxed", "stretch-0.0250"]
+
+
+def test_a_folder_being_written_can_be_read_but_gets_no_report(
+    computed: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with locked(computed):
+        assert main(["report", str(computed)]) == 2
+        assert "circuittex is writing there already" in error_line(capsys)
+        assert main(["netlist", str(computed)]) == 0
 
 
 def test_full_subcircuit_holds_every_contact(computed: Path, capsys: pytest.CaptureFixture[str]) -> None:

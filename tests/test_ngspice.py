@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 import struct
 import sys
 import time
@@ -215,6 +217,23 @@ def test_rubbish(fake: Fake, content: bytes, message: str) -> None:
     fake(f"open('deck0.raw', 'wb').write({content!r})\n")
     with pytest.raises(NgspiceError, match=message):
         run_deck(DIVIDER)
+
+
+def test_a_full_disk_is_no_failure_of_ngspice(fake: Fake, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A study that meets it must stop and go on later, not record a state as unchecked for good."""
+    fake("open('deck0.raw', 'wb').write(b'Title: cut sh')\n")
+    usage = shutil.disk_usage("/")
+    monkeypatch.setattr("circuittex.ngspice.shutil.disk_usage", lambda _: usage._replace(free=1000))
+    with pytest.raises(OSError, match="No space left on device"):
+        run_deck(DIVIDER)
+    monkeypatch.undo()
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(OSError, match="No space left on device"):
+        run_deck(DIVIDER)
+
+
+def full(*_: object, **__: object) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def test_answer_to_another_question(fake: Fake) -> None:

@@ -170,15 +170,17 @@ def serve() -> None:
     threading.Thread(target=_receive, args=(sys.stdin.buffer, tasks), daemon=True).start()
     try:
         while message := tasks.get():
-            task, arguments = pickle.loads(message)
-            _send(answers, _outcome(task, arguments, partial(_tell, answers)))
+            _send(answers, _outcome(message, partial(_tell, answers)))
     except (KeyboardInterrupt, OSError):
         pass  # nobody waits for the answer any more
-    os._exit(0)
+    except BaseException:
+        traceback.print_exc()
+    os._exit(0)  # at an ordinary end the interpreter would wait for the thread that reads
 
 
-def _outcome(task: Task, arguments: tuple[object, ...], say: Say) -> tuple[str, object]:
+def _outcome(message: bytes, say: Say) -> tuple[str, object]:
     try:
+        task, arguments = pickle.loads(message)
         return "done", task(*arguments, say)
     except Exception as error:
         error.add_note(f"in a worker process:\n{traceback.format_exc()}")

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from circuittex.errors import ConvergenceError, DesignError, WorkerError
+from circuittex.mech.configuration import Configuration
 from circuittex.workers import GRACE, THREADS, Computers, Here, Pool
 
 PATIENCE = 60.0
@@ -30,6 +31,17 @@ def double(value: int, say: Say) -> int:
 
 def array(say: Say) -> np.ndarray:
     return np.arange(3.0)
+
+
+def configuration(say: Say) -> Configuration:
+    return Configuration(np.zeros((2, 3, 3)))
+
+
+class Unknown:
+    """Something that another process cannot build."""
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return int, ("no number",)
 
 
 def environment(say: Say) -> list[str]:
@@ -105,6 +117,20 @@ def test_workers_share_the_cores(pool: Pool, monkeypatch: pytest.MonkeyPatch) ->
     assert answers["b"] == 2
 
 
+def test_results_from_another_process_are_locked(pool: Pool) -> None:
+    pool.submit("a", configuration)
+    _, found = pool.next()
+    with pytest.raises(ValueError, match="read-only"):
+        found.x[0] = 1.0
+
+
+def test_a_task_that_cannot_be_built_is_told(pool: Pool) -> None:
+    pool.submit("a", double, Unknown())
+    with pytest.raises(ValueError, match="no number") as told:
+        pool.next()
+    assert "in a worker process" in told.value.__notes__[0]
+
+
 def test_threads_are_set_before_the_libraries_load_unless_the_user_has_set_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -152,6 +178,7 @@ PARENT = """
 import sys
 sys.path.insert(0, sys.argv[1])
 import test_workers
+from circuittex.mech.configuration import Configuration
 from circuittex.workers import Pool
 pool = Pool(2, 1, print)
 pool.submit("a", test_workers.spin, sys.argv[2])

@@ -9,12 +9,11 @@ the beam, written for the eye and not for speed.
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
-from measure import machine, markdown, paired, ratio
+from measure import Table, arguments, paired, publish, ratio
 
 from circuittex.design import Design, plain_weave
 from circuittex.geometry.weave import build_mesh
@@ -54,14 +53,14 @@ def compare(design: Design, repeats: int) -> list[object]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--nodes", type=int, default=4, help="nodes of a fibril, less one")
     parser.add_argument("--repeats", type=int, default=3)
     options = parser.parse_args()
     base = plain_weave(yarns=1)
     numerics = [replace(base.numerics, order=order, elements=options.nodes // order) for order in (1, 2)]
-    print(f"Gradient and tangent of all fibrils, ms (median); {machine()}\n")
-    print(markdown(HEAD, [compare(replace(base, numerics=n), options.repeats) for n in numerics]))
+    rows = [compare(replace(base, numerics=n), options.repeats) for n in numerics]
+    publish(options, [Table("Gradient and tangent of all fibrils, ms (median):", HEAD, rows)])
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ study needs; the second finds them there. Their difference is paid once for an i
 
 from __future__ import annotations
 
-import argparse
 import os
 import subprocess
 import sys
@@ -17,7 +16,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from measure import machine, markdown
+from measure import Table, arguments, publish
 
 HEAD = ["run", "s", "cached kernels"]
 SMALL_STUDY = """
@@ -58,14 +57,14 @@ def kernels(cache: str) -> int:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--repeats", type=int, default=2)
-    pairs = np.array([first_and_second(SMALL_STUDY) for _ in range(parser.parse_args().repeats)])
+    options = parser.parse_args()
+    pairs = np.array([first_and_second(SMALL_STUDY) for _ in range(options.repeats)])
     first, second, kept = (float(x) for x in np.median(pairs, axis=0))
-    print(f"A small relaxation in a fresh process, s (median); {machine()}\n")
     cost = float(np.median(pairs[:, 0] - pairs[:, 1]))
     rows = [["cache empty", first, int(kept)], ["cache full", second, int(kept)], ["difference", cost, ""]]
-    print(markdown(HEAD, rows))
+    publish(options, [Table("A small relaxation in a fresh process, s (median):", HEAD, rows)])
 
 
 if __name__ == "__main__":

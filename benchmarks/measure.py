@@ -1,16 +1,75 @@
-"""Timing that stands other work on the machine: pieces run in turn, and only ratios of neighbours are compared."""
+"""Timing that stands other work on the machine, and what the results are kept in.
+
+Pieces run in turn, and only ratios of neighbours are compared. Every script makes `Table`s, prints them, and with
+`--json FILE` keeps them together with its command, the date and the machine for `table.py`.
+"""
 
 from __future__ import annotations
 
+import argparse
+import json
 import os
 import platform
+import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import date
+from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 Seconds = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of results and the line above it."""
+
+    title: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[object]] = field(default_factory=list)
+
+    def text(self) -> str:
+        """As Markdown."""
+        return f"{self.title}\n\n{markdown(self.head, self.rows)}"
+
+
+def arguments(doc: str | None) -> argparse.ArgumentParser:
+    """A parser of a script's options with the one that all have."""
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="keep the tables in this file for table.py")
+    return parser
+
+
+def publish(options: argparse.Namespace, tables: Iterable[Table]) -> None:
+    """Print tables as they come, and keep them where `--json` asks for it."""
+    print(machine(), flush=True)
+    kept = []
+    for table in tables:
+        print(f"\n{table.text()}", flush=True)
+        kept.append({"title": table.title, "head": list(table.head), "rows": [list(row) for row in table.rows]})
+    if options.json is not None:
+        said = sys.argv[1:]
+        without = [word for k, word in enumerate(said) if "--json" not in (word, *said[max(0, k - 1) : k])]
+        command = " ".join(["python", f"benchmarks/{Path(sys.argv[0]).name}", *without])
+        result = {"command": command, "date": date.today().isoformat(), "machine": machine(), "tables": kept}
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        options.json.write_text(json.dumps(result, indent=1, default=float) + "\n")
+
+
+def fail(message: str) -> NoReturn:
+    """End a script with one line."""
+    sys.exit(f"error: {message}")
+
+
+def seconds_of(piece: Callable[[], object]) -> float:
+    """Seconds that one call takes."""
+    clock = time.perf_counter()
+    piece()
+    return time.perf_counter() - clock
 
 
 def paired(pieces: Mapping[str, Callable[[], object]], repeats: int, *, warm_up: bool = True) -> dict[str, Seconds]:
@@ -24,9 +83,7 @@ def paired(pieces: Mapping[str, Callable[[], object]], repeats: int, *, warm_up:
     seconds = {name: np.empty(repeats) for name in pieces}
     for k in range(repeats):
         for name, piece in pieces.items():
-            clock = time.perf_counter()
-            piece()
-            seconds[name][k] = time.perf_counter() - clock
+            seconds[name][k] = seconds_of(piece)
     return seconds
 
 
@@ -54,6 +111,14 @@ def digits(value: float) -> str:
 
 
 def machine() -> str:
-    """What the numbers were measured on, for the line above a table."""
+    """What the numbers were measured on."""
     load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
-    return f"{os.cpu_count()} cores ({platform.machine()}){load}, Python {platform.python_version()}"
+    return f"{os.cpu_count()} cores ({processor()}){load}, Python {platform.python_version()}"
+
+
+def processor() -> str:
+    """The processor's name, or at least its architecture."""
+    table = Path("/proc/cpuinfo")
+    lines = table.read_text().splitlines() if table.exists() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return f"{names[0]}, {platform.machine()}" if names else platform.machine()

@@ -9,11 +9,10 @@ faster. PySpice builds its objects and then its text, for circuits of up to 2000
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 
 import numpy as np
-from measure import machine, markdown, paired, ratio
+from measure import Table, arguments, paired, publish, ratio
 from woven import woven_circuit
 
 from circuittex.circuit import Circuit
@@ -55,11 +54,11 @@ def ready_words(circuit: Circuit) -> Callable[[], str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--repeats", type=int, default=5)
     options = parser.parse_args()
-    print(f"Microseconds per resistor (median); {machine()}\n")
-    print(markdown(HEAD, [compare(woven_circuit(*cell), options.repeats) for cell in CELLS]))
+    rows = [compare(woven_circuit(*cell), options.repeats) for cell in CELLS]
+    publish(options, [Table("Microseconds per resistor (median):", HEAD, rows)])
 
 
 if __name__ == "__main__":

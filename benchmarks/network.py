@@ -8,10 +8,8 @@ The last column is the largest difference of the two answers' port currents over
 
 from __future__ import annotations
 
-import argparse
-
 import numpy as np
-from measure import machine, markdown, paired, ratio
+from measure import Table, arguments, fail, paired, publish, ratio
 from woven import woven_circuit
 
 from circuittex.circuit import Circuit
@@ -39,13 +37,13 @@ def compare(circuit: Circuit, repeats: int) -> list[object]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("--repeats", type=int, default=5)
     options = parser.parse_args()
     if find_ngspice() is None:
-        parser.error("ngspice was not found; it is what this script compares with")
-    print(f"One drive of one circuit, ms (median); {machine()}\n")
-    print(markdown(HEAD, [compare(woven_circuit(*cell), options.repeats) for cell in CELLS]))
+        fail("ngspice was not found; it is what this script compares with")
+    rows = [compare(woven_circuit(*cell), options.repeats) for cell in CELLS]
+    publish(options, [Table("One drive of one circuit, ms (median):", HEAD, rows)])
 
 
 if __name__ == "__main__":

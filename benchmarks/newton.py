@@ -11,36 +11,27 @@ later one.
 
 from __future__ import annotations
 
-import argparse
-import contextlib
 import importlib.util
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from measure import machine, markdown, paired, ratio
+from measure import Table, arguments, paired, publish, ratio
+from watch import BEAM, CLOSEST, CONTACT, ENERGY, FACTOR, PARTS, SOLVE, Stopwatch, descend
 
 from circuittex.contact.penalty import PenaltyContact
 from circuittex.design import Design, plain_weave
-from circuittex.errors import ConvergenceError
-from circuittex.geometry.mesh import Floats, Ints
+from circuittex.geometry.mesh import Floats
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
-from circuittex.mech.equilibrium import minimise
 from circuittex.mech.linear import CholmodSolver, LinearSolver, PardisoSolver, Solve, SuperLUSolver
 from circuittex.mech.pattern import Pattern
 from circuittex.mech.space import BeamSpace
 from circuittex.mech.terms import ForceTerm
 from circuittex.relaxation import force_terms
-
-SEARCH, CLOSEST, ENERGY = "candidate search", "closest points, contact energy", "beam energy"
-BEAM, CONTACT, MASS = "beam assembly", "contact assembly", "mass matrix"
-ANALYSIS, FACTOR, REFUSED = "analysis and first factorisation", "factorisation", "factorisation, not positive"
-SOLVE, REST = "solution", "the rest (pattern, vectors)"
-PARTS = (SEARCH, CLOSEST, ENERGY, BEAM, CONTACT, MASS, ANALYSIS, FACTOR, REFUSED, SOLVE, REST)
 
 PART_HEAD = ["part", "calls an iteration", "ms a call", "% of the time"]
 SOLVER_HEAD = [
@@ -55,135 +46,6 @@ COARSER = 4
 """How many elements of the mesh in question make one of the mesh on which the state is prepared."""
 LOOSE = 0.02
 """Largest free force of the coarse state, N."""
-
-
-@dataclass
-class Stopwatch:
-    """Seconds of every call in every iteration; the report of an iteration closes it."""
-
-    iterations: list[dict[str, list[float]]] = field(default_factory=list)
-    residual: float = np.inf
-    _now: dict[str, list[float]] = field(default_factory=dict)
-    _clock: float = 0.0
-
-    def add(self, part: str, clock: float) -> None:
-        """One call of a part ends that began at `clock`."""
-        self._now.setdefault(part, []).append(time.perf_counter() - clock)
-
-    def report(self, iteration: int, residual: float) -> None:
-        """The tangent of this iteration is assembled: what follows belongs to the next."""
-        if iteration > 0:
-            rest = time.perf_counter() - self._clock - sum(map(sum, self._now.values()))
-            self.iterations.append({**self._now, REST: [rest]})
-        self.residual, self._now, self._clock = residual, {}, time.perf_counter()
-
-    def calls(self, part: str) -> list[float]:
-        """Seconds of all calls of a part."""
-        return [seconds for iteration in self.iterations for seconds in iteration.get(part, [])]
-
-    def per_iteration(self, *parts: str) -> Floats:
-        """Seconds that the parts take together in each iteration."""
-        return np.array([sum(sum(i.get(part, [])) for part in parts) for i in self.iterations])
-
-
-@dataclass
-class WatchedTerm:
-    """A force term whose calls are timed; keeps the unknowns it was last prepared for."""
-
-    term: ForceTerm
-    watch: Stopwatch
-    parts: tuple[str, str, str]
-    """What its search, energy and assembly are called."""
-    q: Floats = field(default_factory=lambda: np.empty(0))
-
-    def prepare(self, q: Floats) -> bool:
-        self.q, clock = q, time.perf_counter()
-        changed = self.term.prepare(q)
-        if changed:
-            self.watch.add(self.parts[0], clock)
-        return changed
-
-    def pairs(self) -> tuple[Ints, Ints]:
-        return self.term.pairs()
-
-    def energy(self, q: Floats) -> float:
-        clock = time.perf_counter()
-        energy = self.term.energy(q)
-        self.watch.add(self.parts[1], clock)
-        return energy
-
-    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
-        clock = time.perf_counter()
-        energy = self.term.assemble(q, pattern, gradient, data, softening)
-        self.watch.add(self.parts[2], clock)
-        return energy
-
-
-@dataclass
-class WatchedSolver:
-    """A solver whose calls are timed, apart for a new pattern and for matrices that it refuses.
-
-    It keeps the last matrix that it did not refuse.
-    """
-
-    solver: LinearSolver
-    watch: Stopwatch
-    name: str = "watched"
-    matrix: tuple[Pattern, Floats] | None = None
-    _pattern: Pattern | None = None
-
-    def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
-        clock = time.perf_counter()
-        solve = self.solver.factor(pattern, data)
-        part = ANALYSIS if pattern is not self._pattern else (REFUSED if solve is None else FACTOR)
-        self.watch.add(part, clock)
-        self._pattern = pattern
-        if solve is None:
-            return None
-        self.matrix = pattern, data
-        return self._timed(solve)
-
-    def _timed(self, solve: Solve) -> Solve:
-        def timed(b: Floats) -> Floats:
-            clock = time.perf_counter()
-            x = solve(b)
-            self.watch.add(SOLVE, clock)
-            return x
-
-        return timed
-
-
-def descend(
-    terms: tuple[BeamSpace, Beam, PenaltyContact],
-    q: Floats,
-    solver: LinearSolver,
-    iterations: int,
-    tolerance: float = 0.0,
-) -> tuple[Floats, Stopwatch, tuple[Pattern, Floats]]:
-    """The unknowns after that many iterations from q or at that tolerance, what they took, and the last matrix."""
-    space, beam, contact = terms
-    watch = Stopwatch()
-    watched, watched_solver = WatchedTerm(contact, watch, (SEARCH, CLOSEST, CONTACT)), WatchedSolver(solver, watch)
-
-    def mass(pattern: Pattern) -> Floats:
-        clock = time.perf_counter()
-        values = beam.mass(pattern)
-        watch.add(MASS, clock)
-        return values
-
-    with contextlib.suppress(ConvergenceError):  # it is not meant to converge in so few
-        minimise(
-            [WatchedTerm(beam, watch, (SEARCH, ENERGY, BEAM)), watched],
-            q,
-            mass=mass,
-            fixed=space.fixed,
-            solver=watched_solver,
-            tolerance=tolerance,
-            max_iterations=iterations,
-            report=watch.report,
-        )
-    assert watched_solver.matrix is not None, "at least one iteration is needed"
-    return watched.q, watch, watched_solver.matrix
 
 
 def coarse_state(design: Design, solver: LinearSolver) -> Configuration:
@@ -269,34 +131,32 @@ def _solve(solves: list[Solve], b: Floats) -> None:
     solves[-1](b)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--elements", type=int, default=20, help="quadratic elements of a fibril, a multiple of 4")
-    parser.add_argument("--iterations", type=int, default=4, help="iterations that are measured")
-    parser.add_argument("--repeats", type=int, default=3, help="factorisations of the same matrix by each solver")
-    options = parser.parse_args()
-    base = plain_weave()
-    design = replace(base, numerics=replace(base.numerics, elements=options.elements))
-    for line in report(design, options.iterations, options.repeats):
-        print(line, flush=True)
-
-
-def report(design: Design, iterations: int, repeats: int) -> Iterator[str]:
-    """The lines of the report, as they come."""
+def report(design: Design, iterations: int, repeats: int) -> Iterator[Table]:
+    """The tables, as they come."""
     solvers, fastest = [solver() for solver in installed()], installed()[0]()
     mesh = build_mesh(design)
     terms = force_terms(mesh, design)
     start = terms[0].vector(coarse_state(design, fastest))
     q, watch, matrix = descend(terms, start, fastest, iterations)
     contacts = len(terms[2].touching(q).overlap)
-    yield (
-        f"State after these iterations: largest free force {watch.residual:.2g} N, {contacts} contact points, "
-        f"{len(q)} unknowns, {matrix[0].nnz} entries of the upper triangle; {machine()}\n"
+    title = (
+        f"{iterations} iterations with {fastest.name}, after which the largest free force is {watch.residual:.2g} N, "
     )
-    yield f"{iterations} iterations with {fastest.name}:\n"
-    yield markdown(PART_HEAD, part_rows(watch))
-    yield "\nThe same matrix in every solver, and an iteration with one factorisation of a known pattern:\n"
-    yield markdown(SOLVER_HEAD, solver_rows(terms, q, matrix, solvers, repeats))
+    title += f"with {contacts} contact points, {len(q)} unknowns, {matrix[0].nnz} entries of the upper triangle:"
+    yield Table(title, PART_HEAD, part_rows(watch))
+    title = "The same matrix in every solver, and an iteration with one factorisation of a known pattern:"
+    yield Table(title, SOLVER_HEAD, solver_rows(terms, q, matrix, solvers, repeats))
+
+
+def main() -> None:
+    parser = arguments(__doc__)
+    parser.add_argument("--elements", type=int, default=20, help="quadratic elements of a fibril, a multiple of 4")
+    parser.add_argument("--iterations", type=int, default=4, help="iterations that are measured")
+    parser.add_argument("--repeats", type=int, default=3, help="factorisations of the same matrix by each solver")
+    options = parser.parse_args()
+    base = plain_weave()
+    design = replace(base, numerics=replace(base.numerics, elements=options.elements))
+    publish(options, report(design, options.iterations, options.repeats))
 
 
 if __name__ == "__main__":

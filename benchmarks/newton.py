@@ -27,7 +27,8 @@ from circuittex.geometry.mesh import Floats
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
-from circuittex.mech.linear import CholmodSolver, LinearSolver, PardisoSolver, Solve, SuperLUSolver
+from circuittex.mech.linear import CholmodSolver, LinearSolver, PardisoSolver, Solve
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import Pattern
 from circuittex.mech.space import BeamSpace
 from circuittex.mech.terms import ForceTerm
@@ -66,7 +67,7 @@ def coarse_state(design: Design, solver: LinearSolver) -> Configuration:
 def installed() -> list[Callable[[], LinearSolver]]:
     """The solvers that can be had here, the fastest first."""
     extras: list[tuple[Callable[[], LinearSolver], str]] = [(PardisoSolver, "pypardiso"), (CholmodSolver, "cvxopt")]
-    return [*(solver for solver, package in extras if importlib.util.find_spec(package)), SuperLUSolver]
+    return [*(solver for solver, package in extras if importlib.util.find_spec(package)), MultifrontalSolver]
 
 
 def part_rows(watch: Stopwatch) -> list[list[object]]:

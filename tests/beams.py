@@ -17,7 +17,7 @@ from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.mech.equilibrium import Minimum, minimise
-from circuittex.mech.linear import SuperLUSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import Pattern, build_pattern
 from circuittex.mech.space import DOFS, BeamSpace, beam_space
 from circuittex.mech.terms import ForceTerm
@@ -102,7 +102,7 @@ def rest(
         beam.space.vector(start),
         mass=beam.mass,
         fixed=fixed,
-        solver=SuperLUSolver(),
+        solver=MultifrontalSolver(),
         tolerance=tolerance,
         max_iterations=max_iterations,
     )

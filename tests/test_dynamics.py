@@ -14,7 +14,7 @@ from circuittex.geometry.mesh import FibrilMesh, Floats
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.dynamics import Rest, affine_velocity, damping_matrix, march, relax_dynamically
-from circuittex.mech.linear import SuperLUSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.space import BeamSpace, beam_space
 from circuittex.relaxation import clamp_force, force_terms, move, relax
 
@@ -47,7 +47,7 @@ def test_free_flight_coasts_and_drag_slows_it_by_a_known_factor(gamma: float) ->
                 mass=beam.mass,
                 damping=damping_matrix(space, gamma),
                 fixed=np.empty(0, dtype=np.int64),
-                solver=SuperLUSolver(),
+                solver=MultifrontalSolver(),
                 dt=dt,
                 tolerance=1e-12,
             ),
@@ -88,7 +88,7 @@ def test_an_axial_wave_has_its_frequency_and_its_numerical_damping(gamma: float)
         mass=beam.mass,
         damping=damping_matrix(space, gamma),
         fixed=space.fixed,
-        solver=SuperLUSolver(),
+        solver=MultifrontalSolver(),
         dt=dt,
         tolerance=1e-8,
     )
@@ -119,7 +119,7 @@ def test_kinetic_energy_of_a_spinning_fibril_has_the_rotary_term() -> None:
         mass=beam.mass,
         damping=damping_matrix(space, 0.0),
         fixed=space.fixed,
-        solver=SuperLUSolver(),
+        solver=MultifrontalSolver(),
         dt=1e-6,
         tolerance=1e-9,
     )
@@ -141,7 +141,7 @@ def settle(cell: tuple[Design, FibrilMesh], **options: object) -> tuple[BeamSpac
         mass=beam.mass,
         damping=damping_matrix(space, GAMMA),
         fixed=space.fixed,
-        solver=SuperLUSolver(),
+        solver=MultifrontalSolver(),
         tolerance=TIGHT,
         **settings,
     )
@@ -150,7 +150,7 @@ def settle(cell: tuple[Design, FibrilMesh], **options: object) -> tuple[BeamSpac
 
 def test_dynamic_relaxation_ends_in_the_equilibrium(cell: tuple[Design, FibrilMesh]) -> None:
     design, mesh = cell
-    static = relax(mesh, design, solver=SuperLUSolver())
+    static = relax(mesh, design, solver=MultifrontalSolver())
     space, rest = settle(cell)
     expected = clamp_force(mesh, static.reaction)
     found = clamp_force(mesh, space.configuration(rest.gradient).r)
@@ -179,7 +179,7 @@ def test_algorithm_1_moves_and_relaxes_to_the_next_equilibrium(cell: tuple[Desig
     start = move(space.configuration(first.q), np.eye(2), stretched)
     ends = np.concatenate([mesh.end_nodes(-1), mesh.end_nodes(+1)])
     assert np.abs(space.configuration(rest.q).r[ends] - start.r[ends]).max() < 1e-14
-    static = relax(mesh, design, start, solver=SuperLUSolver())
+    static = relax(mesh, design, start, solver=MultifrontalSolver())
     expected = clamp_force(mesh, static.reaction)
     found = clamp_force(mesh, space.configuration(rest.gradient).r)
     assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()

@@ -25,7 +25,7 @@ from circuittex.fit import fit_network
 from circuittex.frozen import same
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration, initial_configuration
-from circuittex.mech.linear import SuperLUSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation import Equilibrium, clamp_force, relax
 from circuittex.results import Record, Study
 from circuittex.store import load_study
@@ -56,12 +56,12 @@ def values_of(record: Record) -> list[float]:
 def cell() -> Cell:
     """Three fibrils a yarn, relaxed on eight elements."""
     design, mesh = small_cell((1, 2), elements=8)
-    return design, mesh, record_of(design, mesh, relax(mesh, design, solver=SuperLUSolver()))
+    return design, mesh, record_of(design, mesh, relax(mesh, design, solver=MultifrontalSolver()))
 
 
 @pytest.fixture(scope="module")
 def estimate(cell: Cell) -> ErrorEstimate:
-    return estimate_error(*cell, SuperLUSolver)
+    return estimate_error(*cell, MultifrontalSolver)
 
 
 def test_the_estimate_covers_the_error_and_is_of_its_size(cell: Cell, estimate: ErrorEstimate) -> None:
@@ -73,7 +73,7 @@ def test_the_estimate_covers_the_error_and_is_of_its_size(cell: Cell, estimate: 
     _, mesh, record = cell
     finest, fine_mesh = small_cell((1, 2), elements=48, contact_points=6)
     start = transfer(record.configuration, mesh, fine_mesh)
-    reference = record_of(finest, fine_mesh, relax(fine_mesh, finest, start, solver=SuperLUSolver()))
+    reference = record_of(finest, fine_mesh, relax(fine_mesh, finest, start, solver=MultifrontalSolver()))
     assert estimate.warnings == ()
     assert [quantity.value for quantity in estimate.quantities] == values_of(record)
     true = np.abs(np.array(values_of(record)) - values_of(reference))
@@ -104,7 +104,7 @@ def test_a_rearrangement_is_named() -> None:
     """The initial weave is no equilibrium: whatever mesh relaxes it moves its fibrils by about a radius."""
     design, mesh = small_cell((2,), elements=4)
     record = replace(synthetic_study(1, contacts=1, rows=(1,)).records[0], configuration=initial_configuration(mesh))
-    found = estimate_error(design, mesh, record, SuperLUSolver)
+    found = estimate_error(design, mesh, record, MultifrontalSolver)
     assert len(found.warnings) == 3
     assert all("fibrils rearrange" in text and "another branch" in text for text in found.warnings)
     assert "half as many elements" in found.warnings[0]
@@ -114,7 +114,7 @@ def test_a_rearrangement_is_named() -> None:
 def test_a_variant_without_equilibrium_is_named(cell: Cell) -> None:
     design, mesh, record = cell
     hasty = replace(design, numerics=replace(design.numerics, max_iterations=1))
-    found = estimate_error(hasty, mesh, record, SuperLUSolver)
+    found = estimate_error(hasty, mesh, record, MultifrontalSolver)
     assert [text.count("there is no equilibrium near the state") for text in found.warnings] == [1, 1, 1]
     assert np.isnan([quantity.absolute for quantity in found.quantities]).all()
     assert np.isnan(found.moved).all()
@@ -133,7 +133,7 @@ def test_the_clamps_are_those_of_the_states_path(
         raise ConvergenceError("not wanted")
 
     monkeypatch.setattr(module, "relax", refuse)
-    estimate_error(design, mesh, replace(record, path=path), SuperLUSolver)
+    estimate_error(design, mesh, replace(record, path=path), MultifrontalSolver)
     assert seen == [expected] * 3
 
 
@@ -145,7 +145,7 @@ def test_it_says_what_it_does(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> No
         raise ConvergenceError("not wanted")
 
     monkeypatch.setattr(module, "relax", refuse)
-    estimate_error(design, mesh, record, SuperLUSolver, said.append)
+    estimate_error(design, mesh, record, MultifrontalSolver, said.append)
     assert said == [f"relaxed: error estimate, {words}" for words in module.VARIANTS]
 
 
@@ -286,7 +286,7 @@ def test_estimates_are_in_the_order_of_their_states(canned: Study) -> None:
         kept.append(estimate.state)
         return replace(study, errors=(*study.errors, estimate))
 
-    study = estimate_errors(canned, LastFirst(), SuperLUSolver, keep)
+    study = estimate_errors(canned, LastFirst(), MultifrontalSolver, keep)
     assert kept == ["stretch-0.05", "shear-0.05", "relaxed"]
     assert [estimate.state for estimate in study.errors] == ESTIMATED
 
@@ -304,7 +304,7 @@ def test_a_computed_study_with_its_estimates() -> None:
     """The real thing in two processes, each with the mesh and the state that it is sent."""
     design, _ = small_cell((1,), elements=8, order=1, section_degree=6)
     design = replace(design, terminals=(), probes=(), loading=(uniaxial("strip", (0.02,), free="y"),))
-    study = run_study(design, error_estimate=True, workers=2, solver=SuperLUSolver)
+    study = run_study(design, error_estimate=True, workers=2, solver=MultifrontalSolver)
     assert [estimate.state for estimate in study.errors] == ["relaxed", "strip-0.02"]
     for estimate, record in zip(study.errors, study.records, strict=True):
         along, across, *network = estimate.quantities

@@ -18,7 +18,7 @@ from circuittex.geometry.mesh import FibrilMesh, Floats
 from circuittex.geometry.weave import build_mesh
 from circuittex.increment import Increment, advance
 from circuittex.mech.configuration import Configuration, initial_configuration
-from circuittex.mech.linear import SuperLUSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation import Equilibrium, clamp_force, relax
 
 TIGHT = 1e-8  # N
@@ -31,7 +31,7 @@ REST = np.eye(2)
 def cell() -> tuple[Design, FibrilMesh, Equilibrium]:
     """Two by two yarns of one fibril, woven and relaxed; half a turn about x takes it to itself."""
     design, mesh = small_cell((1,), tolerance=TIGHT)
-    return design, mesh, relax(mesh, design, solver=SuperLUSolver())
+    return design, mesh, relax(mesh, design, solver=MultifrontalSolver())
 
 
 Cell = tuple[Design, FibrilMesh, Equilibrium]
@@ -42,7 +42,7 @@ def follow(cell: Cell, loading: Loading) -> list[Increment]:
     design, mesh, relaxed = cell
     states, now, before = [], relaxed.configuration, REST
     for target in np.array(loading.gradients):
-        states.append(advance(mesh, design, now, before, target, free=loading.free, solver=SuperLUSolver()))
+        states.append(advance(mesh, design, now, before, target, free=loading.free, solver=MultifrontalSolver()))
         now, before = states[-1].equilibrium.configuration, target
     return states
 
@@ -133,7 +133,7 @@ def test_compression_buckles_the_fibrils_at_eulers_load() -> None:
     start = initial_configuration(mesh)
 
     def warp_force(strain: float) -> float:
-        state = advance(mesh, design, start, REST, np.diag([1 + strain, 1.0]), solver=SuperLUSolver())
+        state = advance(mesh, design, start, REST, np.diag([1 + strain, 1.0]), solver=MultifrontalSolver())
         return float(clamp_force(mesh, state.equilibrium.reaction)[0, 0]) / 2
 
     assert warp_force(-0.002) == pytest.approx(pull(0.998), rel=1e-6)
@@ -149,7 +149,7 @@ def test_straight_free_yarns_take_their_natural_length_back(free: str) -> None:
     """Stretched by a tenth both ways and let go along one: 4 mm there, a neo-Hookean pull along the other."""
     design, mesh = straight_cell(elements=4)
     start = initial_configuration(mesh)
-    state = advance(mesh, design, start, REST, 1.1 * REST, free=free, solver=SuperLUSolver())
+    state = advance(mesh, design, start, REST, 1.1 * REST, free=free, solver=MultifrontalSolver())
     loose, held = (0, 1) if free == "x" else (1, 0)
     equilibrium = state.equilibrium
     assert chords(mesh, equilibrium.configuration.r, loose) == pytest.approx(4.0, abs=1e-6)
@@ -175,7 +175,7 @@ def test_three_crossings_hold_a_free_yarn_crimped() -> None:
     design = plain_weave(yarns=3, rows=(1,))
     design = replace(design, numerics=replace(design.numerics, elements=8))
     mesh = build_mesh(design)
-    relaxed = relax(mesh, design, solver=SuperLUSolver())
+    relaxed = relax(mesh, design, solver=MultifrontalSolver())
     strip = follow((design, mesh, relaxed), uniaxial("strip", [0.05, 0.1], free="y"))
     clamped = follow((design, mesh, relaxed), uniaxial("held", [0.05, 0.1]))
     drawn_in = []
@@ -204,8 +204,8 @@ def test_halves_lead_where_the_whole_step_leads(cell: Cell) -> None:
     limited = replace(design, numerics=replace(design.numerics, max_iterations=2))
     said: list[str] = []
     target = np.diag([1.02, 1.0])
-    halved = advance(mesh, limited, relaxed.configuration, REST, target, solver=SuperLUSolver(), say=said.append)
-    whole = advance(mesh, design, relaxed.configuration, REST, target, solver=SuperLUSolver())
+    halved = advance(mesh, limited, relaxed.configuration, REST, target, solver=MultifrontalSolver(), say=said.append)
+    whole = advance(mesh, design, relaxed.configuration, REST, target, solver=MultifrontalSolver())
     assert whole.parts == 1
     assert whole.iterations == whole.equilibrium.iterations > 2
     assert halved.parts == 1 + len(said) > 1
@@ -221,7 +221,7 @@ def test_a_step_that_starts_inside_out_is_halved() -> None:
     target = 3 * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     said: list[str] = []
     start = initial_configuration(mesh)
-    state = advance(mesh, design, start, REST, target, solver=SuperLUSolver(), say=said.append)
+    state = advance(mesh, design, start, REST, target, solver=MultifrontalSolver(), say=said.append)
     assert state.parts == 2
     assert len(said) == 1
     assert "inside out" in said[0]
@@ -296,6 +296,6 @@ def test_an_interruption_is_no_reason_to_halve(cell: Cell) -> None:
 
 def test_a_step_of_no_length_changes_nothing(cell: Cell) -> None:
     design, mesh, relaxed = cell
-    state = advance(mesh, design, relaxed.configuration, REST, REST, solver=SuperLUSolver())
+    state = advance(mesh, design, relaxed.configuration, REST, REST, solver=MultifrontalSolver())
     assert (state.parts, state.iterations) == (1, 0)
     assert same(state.equilibrium.configuration, relaxed.configuration)

@@ -8,12 +8,11 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-import scipy.sparse.linalg
 from beams import dense
 
-import circuittex.mech.linear as linear
 from circuittex.geometry.mesh import Floats
-from circuittex.mech.linear import CholmodSolver, LinearSolver, PardisoSolver, SuperLUSolver, best_solver
+from circuittex.mech.linear import CholmodSolver, LinearSolver, PardisoSolver, best_solver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import Pattern, build_pattern, diagonal
 
 
@@ -23,7 +22,7 @@ def has(module: str) -> bool:
 
 
 SOLVERS: list[Callable[[], LinearSolver]] = [
-    SuperLUSolver,
+    MultifrontalSolver,
     *([PardisoSolver] if has("pypardiso") else []),
     *([CholmodSolver] if has("cvxopt") else []),
 ]
@@ -137,29 +136,11 @@ def test_singular_matrix_is_none(make: Callable[[], LinearSolver]) -> None:
         assert_solves(solver, pattern, data, 5)
 
 
-def test_superlu_orders_a_pattern_once_and_never_works_without_an_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where the first matrix of a pattern is singular: its ordering must not be mistaken for the natural one."""
-    orderings: list[str] = []
-    splu = scipy.sparse.linalg.splu
-
-    def recording(*args: object, permc_spec: str, **options: object) -> object:
-        orderings.append(permc_spec)
-        return splu(*args, permc_spec=permc_spec, **options)
-
-    monkeypatch.setattr(linear, "splu", recording)
-    solver, pattern = SuperLUSolver(), random_pattern(6)
-    data = shifted(pattern, random_values(pattern, 6), 0.1)
-    assert solver.factor(pattern, np.zeros(pattern.nnz)) is None
-    for seed in range(3):
-        assert_solves(solver, pattern, data, seed)
-    assert orderings == ["MMD_AT_PLUS_A", "MMD_AT_PLUS_A", "NATURAL", "NATURAL"]
-
-
 def test_best_solver_is_the_first_that_can_be_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A wheel that is missing, or whose own libraries are, is passed over; SciPy is always there."""
+    """A wheel that is missing, or whose own libraries are, is passed over; the last needs none."""
     installed = [name for name, module in (("pardiso", "pypardiso"), ("cholmod", "cvxopt")) if has(module)]
-    expected = [*installed, "superlu"]
+    expected = [*installed, "multifrontal"]
     assert best_solver().name == expected[0]
     for module in ("pypardiso", "cvxopt"):
         monkeypatch.setitem(sys.modules, module, None)  # makes its import raise ImportError
-    assert best_solver().name == "superlu"
+    assert best_solver().name == "multifrontal"

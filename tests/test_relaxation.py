@@ -15,7 +15,7 @@ from circuittex.frozen import same
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
-from circuittex.mech.linear import SuperLUSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation import Equilibrium, clamp_force, force_terms, move, relax
 
 TIGHT = 1e-9  # N; clamp forces are some 0.1 N, so that results agree to 1e-7 and better
@@ -23,7 +23,7 @@ AGREE = 1e-7  # of forces in N and positions in mm between runs that differ by r
 
 
 def solved(design: Design, mesh: FibrilMesh, start: Configuration | None = None) -> Equilibrium:
-    return relax(mesh, design, start, solver=SuperLUSolver())
+    return relax(mesh, design, start, solver=MultifrontalSolver())
 
 
 @pytest.fixture(scope="module")
@@ -165,7 +165,7 @@ def test_a_start_that_is_inside_out_is_an_error(cell: Cell) -> None:
 def test_progress_is_reported_for_every_iteration(cell: Cell) -> None:
     design, mesh, equilibrium = cell
     seen: list[tuple[int, float]] = []
-    relax(mesh, design, solver=SuperLUSolver(), report=lambda i, residual: seen.append((i, residual)))
+    relax(mesh, design, solver=MultifrontalSolver(), report=lambda i, residual: seen.append((i, residual)))
     assert [i for i, _ in seen] == list(range(equilibrium.iterations + 1))
     assert [residual for _, residual in seen] == equilibrium.history[:, 0].tolist()
 

@@ -20,7 +20,7 @@ from circuittex.design import Design, shear, uniaxial
 from circuittex.errors import ConvergenceError, DesignError, FolderError, StoreError
 from circuittex.frozen import same
 from circuittex.lock import locked
-from circuittex.mech.linear import SuperLUSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.store import load_study
 from circuittex.store.archive import Digests
 from circuittex.study import cores, run_study
@@ -136,10 +136,10 @@ def test_interrupted_then_killed_then_completed_by_other_numbers_of_workers(
 
 
 def test_the_solver_is_made_anew_for_every_relaxation() -> None:
-    made: list[SuperLUSolver] = []
+    made: list[MultifrontalSolver] = []
 
-    def make() -> SuperLUSolver:
-        made.append(SuperLUSolver())
+    def make() -> MultifrontalSolver:
+        made.append(MultifrontalSolver())
         return made[-1]
 
     run_study(replace(cell(), loading=(shear("shear", (0.05,)),)), solver=make, workers=2)

@@ -14,9 +14,9 @@ from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import splu
 
-from circuittex.geometry.mesh import Floats, Ints
+from circuittex.geometry.mesh import Floats
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import Pattern
 
 Solve = Callable[[Floats], Floats]
@@ -32,74 +32,13 @@ class LinearSolver(Protocol):
 
 
 def best_solver() -> LinearSolver:
-    """The fastest installed: PARDISO, then CHOLMOD (both of the `fast` extra), then SciPy's SuperLU."""
+    """The fastest installed: PARDISO, then CHOLMOD (both of the `fast` extra), then the one that needs neither."""
     for solver in (PardisoSolver, CholmodSolver):
         try:
             return solver()
         except (ImportError, OSError):  # not installed, or a library of its own is missing
             continue
-    return SuperLUSolver()
-
-
-class SuperLUSolver:
-    """SciPy's SuperLU with diagonal pivots, so that the signs of U's diagonal tell the inertia.
-
-    Its fill-reducing ordering (minimum degree on A + A^T) is computed once for a pattern; later matrices are
-    permuted with it beforehand.
-    """
-
-    name = "superlu"
-
-    def __init__(self) -> None:
-        self._pattern: Pattern | None = None
-        self._order: Ints = np.empty(0, dtype=np.int64)
-        self._source: Ints = np.empty(0, dtype=np.int64)
-        self._full: Any = None
-
-    def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
-        """A function that solves with the matrix, or None if a pivot is not positive."""
-        spec = "NATURAL"
-        if pattern is not self._pattern:
-            self._arrange(pattern, np.arange(pattern.n_dofs))
-            spec = "MMD_AT_PLUS_A"
-        self._full.data = data[self._source]
-        try:
-            lu = splu(
-                self._full, permc_spec=spec, diag_pivot_thresh=0.0, options={"SymmetricMode": True, "Equil": False}
-            )
-        except RuntimeError:  # SuperLU's word for an exactly singular matrix
-            self._pattern = None  # it tells no ordering either
-            return None
-        order, place = self._order, lu.perm_c
-        if spec != "NATURAL":
-            self._arrange(pattern, np.argsort(place))
-        if not (np.array_equal(lu.perm_r, lu.perm_c) and lu.U.diagonal().min() > 0):
-            return None
-
-        def solve(b: Floats) -> Floats:
-            x = np.empty_like(b)
-            x[order] = lu.solve(b[order])
-            return x
-
-        return solve
-
-    def _arrange(self, pattern: Pattern, order: Ints) -> None:
-        """Prepare the full matrix with rows and columns in the given order, and where its values come from."""
-        n = pattern.n_dofs
-        upper = sp.csr_array((np.arange(pattern.nnz, dtype=np.float64), pattern.indices, pattern.indptr), shape=(n, n))
-        rows, columns = upper.tocoo().coords
-        off = rows != columns
-        place = np.empty(n, dtype=np.int64)
-        place[order] = np.arange(n)
-        source = np.concatenate([np.arange(pattern.nnz), np.flatnonzero(off)])
-        i, j = place[np.concatenate([rows, columns[off]])], place[np.concatenate([columns, rows[off]])]
-        by_column = np.lexsort((i, j))
-        self._source = source[by_column]
-        start = np.searchsorted(j[by_column], np.arange(n + 1))
-        self._full = sp.csc_array(
-            (np.empty(len(source)), i[by_column].astype(np.int32), start.astype(np.int32)), shape=(n, n)
-        )
-        self._pattern, self._order = pattern, order
+    return MultifrontalSolver()
 
 
 class CholmodSolver:

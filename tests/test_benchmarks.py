@@ -21,6 +21,7 @@ SCRIPTS = [
     "assembly",
     "compile",
     "dolfinx_beam",
+    "invariance",
     "kills",
     "mesh_study",
     "netlist",

@@ -215,10 +215,10 @@ def test_halves_lead_where_the_whole_step_leads(cell: Cell) -> None:
 
 
 def test_a_step_that_starts_inside_out_is_halved() -> None:
-    """Fibrils turned by 100 degrees have their directors behind them; half way, at 80 degrees, they do not."""
+    """Fibrils turned by 140 degrees have their directors behind them, even as predicted; half way they do not."""
     design, mesh = straight_cell(elements=4)
-    angle = np.deg2rad(100)
-    target = 3 * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    angle = np.deg2rad(140)
+    target = 1.2 * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     said: list[str] = []
     start = initial_configuration(mesh)
     state = advance(mesh, design, start, REST, target, solver=MultifrontalSolver(), say=said.append)
@@ -226,7 +226,7 @@ def test_a_step_that_starts_inside_out_is_halved() -> None:
     assert len(said) == 1
     assert "inside out" in said[0]
     force = clamp_force(mesh, state.equilibrium.reaction)
-    assert force[0, :2] == pytest.approx(2 * pull(3.0) * target[:, 0] / 3, abs=1e-5)
+    assert force[0, :2] == pytest.approx(2 * pull(1.2) * target[:, 0] / 1.2, abs=1e-5)
 
 
 Tried = list[tuple[float, float]]

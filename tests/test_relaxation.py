@@ -15,7 +15,10 @@ from circuittex.frozen import same
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.equilibrium import predict
+from circuittex.mech.linear import Solve
 from circuittex.mech.multifrontal import MultifrontalSolver
+from circuittex.mech.pattern import Pattern
 from circuittex.relaxation import Equilibrium, clamp_force, force_terms, move, relax
 
 TIGHT = 1e-9  # N; clamp forces are some 0.1 N, so that results agree to 1e-7 and better
@@ -243,3 +246,41 @@ def test_stiff_and_light_materials_relax_to_the_same_shape(modulus: float, densi
     )
     energies = [relax(build_mesh(design), design).energy for design in (soft, stiff)]
     assert energies[1] / energies[0] == pytest.approx(ratio, rel=1e-6)  # residuals of 1e-6 of the forces
+
+
+def test_a_prediction_is_of_second_order(cell: Cell) -> None:
+    """Half the increment: a quarter of the distance to the equilibrium, where the affine start has half of it."""
+    design, mesh, relaxed = cell
+    space, beam, contact = force_terms(mesh, design)
+    q, solver = space.vector(relaxed.configuration), MultifrontalSolver()
+
+    def distances(strain: float) -> np.ndarray:
+        moved = move(relaxed.configuration, np.eye(2), np.diag([1 + strain, 1.0]))
+        to = space.vector(moved)
+        predicted = predict([beam, contact], q, to, mass=beam.mass, fixed=space.fixed, solver=solver)
+        goal = relax(mesh, design, moved, before=relaxed.configuration, solver=solver).configuration.r
+        return np.array([np.abs(r - goal).max() for r in (moved.r, space.configuration(predicted).r)])
+
+    affine, predicted = np.log2(distances(2e-3) / distances(1e-3))
+    # Contacts that open or close in the step blur the orders: half an order either way.
+    assert affine == pytest.approx(1, abs=0.5)
+    assert predicted == pytest.approx(2, abs=0.5)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_refused_factorisations_only_cost_iterations(cell: Cell, seed: int) -> None:
+    """A solver that calls three of five matrices indefinite at random, early and late, leads to the same minimum."""
+    design, mesh, relaxed = cell
+    rng, inner = np.random.default_rng(seed), MultifrontalSolver()
+
+    class Refusing:
+        name = "refusing"
+
+        def factor(self, pattern: Pattern, data: np.ndarray) -> Solve | None:
+            return None if rng.random() < 0.6 else inner.factor(pattern, data)
+
+    moved = move(relaxed.configuration, np.eye(2), np.diag([1.01, 1.0]))
+    expected = solved(design, mesh, moved)
+    found = relax(mesh, design, moved, solver=Refusing())
+    assert found.iterations >= expected.iterations
+    assert np.abs(found.reaction - expected.reaction).max() < AGREE

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from circuittex.compiled import cores
 from circuittex.contact.closest import find_contacts
 from circuittex.contact.curve import BASIS, CurveTable, bezier, curve_table
 from circuittex.contact.kernels import add_contacts
@@ -168,7 +168,7 @@ def _search(mesh: FibrilMesh, table: CurveTable, points: Floats, candidates: Can
         )
 
     edges = np.linspace(0, shape[0], CHUNKS + 1).astype(int)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         list(pool.map(piece, map(slice, edges[:-1], edges[1:])))
     row, p = np.nonzero(overlap > 0)
     interval = candidates.interval[row]

@@ -7,6 +7,7 @@ the same `Pattern` object comes back.
 
 from __future__ import annotations
 
+import os
 import sys
 import warnings
 from collections.abc import Callable
@@ -83,6 +84,9 @@ class PardisoSolver:
     name = "pardiso"
     _CHOLESKY, _ANALYSE, _FACTOR, _SOLVE, _RELEASE = 2, 11, 22, 33, -1
     _NOT_POSITIVE = -4
+    _SETTINGS = ((1, 1), (2, 2), (34, 2))
+    """Places and values of iparm: own settings, METIS ordering, no refinement; and the work divided as for two threads
+    whatever their number, so that the result has the same bits on any number."""
 
     def __init__(self) -> None:
         self._pattern: Pattern | None = None
@@ -92,6 +96,10 @@ class PardisoSolver:
 
         self._error = pypardiso.pardiso_wrapper.PyPardisoError
         self._pardiso = pypardiso.PyPardisoSolver(mtype=self._CHOLESKY)
+        # What took a search of the whole environment is found at once the next time, by worker processes as well.
+        os.environ.setdefault("PYPARDISO_MKL_RT", self._pardiso.libmkl._name)
+        for place, value in self._SETTINGS:
+            self._pardiso.set_iparm(place, value)
         self._matrix: Any = None
 
     def _call(self, phase: int, b: Floats) -> Floats:

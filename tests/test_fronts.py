@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 import circuittex.mech.fronts as fronts
 from circuittex.geometry.mesh import Ints
-from circuittex.mech.fronts import Analysis, pair_of_entry
+from circuittex.mech.coupled import pair_of_entry
+from circuittex.mech.fronts import Analysis
 from circuittex.mech.pattern import Pattern, build_pattern
 
 NOTHING = np.empty((0, 2), dtype=np.int64)

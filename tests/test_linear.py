@@ -11,6 +11,7 @@ import pytest
 from beams import dense
 
 from circuittex.geometry.mesh import Floats
+from circuittex.mech.coupled import Coupled, pair_of_entry
 from circuittex.mech.linear import CholmodSolver, LinearSolver, PardisoSolver, best_solver
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import Pattern, build_pattern, diagonal
@@ -144,3 +145,30 @@ def test_best_solver_is_the_first_that_can_be_loaded(monkeypatch: pytest.MonkeyP
     for module in ("pypardiso", "cvxopt"):
         monkeypatch.setitem(sys.modules, module, None)  # makes its import raise ImportError
     assert best_solver().name == "multifrontal"
+
+
+@pytest.mark.parametrize("make", SOLVERS)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_pairs_without_values_may_gain_and_lose_them(make: Callable[[], LinearSolver], seed: int) -> None:
+    """Fibrils that part leave zeros in a pattern that holds, and those that meet fill them again."""
+    pattern, solver = random_pattern(seed), make()
+    pair, values = pair_of_entry(pattern), random_values(pattern, seed)
+    some = values * ~np.isin(pair, np.arange(0, len(pattern.neighbour), 2))
+    assert 0 < np.count_nonzero(some) < np.count_nonzero(values)
+    for data in (some, values, some):
+        assert_solves(solver, pattern, shifted(pattern, data, 0.1), seed)
+        assert solver.factor(pattern, shifted(pattern, data, -0.1)) is None
+
+
+def test_pairs_count_from_when_they_are_coupled() -> None:
+    pattern = random_pattern(0)
+    pair, values = pair_of_entry(pattern), random_values(pattern, 0)
+    coupled, few = Coupled(), np.where(pair == 0, values, 0.0)
+    assert coupled.renew(pattern, few)
+    assert np.array_equal(np.flatnonzero(coupled.pairs), [0])
+    assert set(pair[coupled.entries]) == {-1, 0}
+    rows = np.split(pair, pattern.indptr[1:-1])
+    assert np.array_equal(np.diff(coupled.start()), [np.isin(row, (-1, 0)).sum() for row in rows])
+    assert not coupled.renew(pattern, np.zeros(pattern.nnz))
+    assert coupled.renew(pattern, values)
+    assert coupled.pairs.all()

@@ -13,7 +13,7 @@ from test_fronts import patterns
 import circuittex.mech.fronts as fronts
 import circuittex.mech.multifrontal as multifrontal
 from circuittex.geometry.mesh import Floats, Ints
-from circuittex.mech.fronts import pair_of_entry
+from circuittex.mech.coupled import pair_of_entry
 from circuittex.mech.multifrontal import BLOCK, MultifrontalSolver
 from circuittex.mech.pattern import Pattern, build_pattern, diagonal
 

@@ -60,18 +60,10 @@ class Analysis:
     """values in the factor."""
 
 
-def pair_of_entry(pattern: Pattern) -> Ints:
-    """(nnz,) which of the pattern's node pairs each entry belongs to; -1 within a node."""
-    n = pattern.n_dofs // DOFS
-    a, b = np.repeat(np.arange(pattern.n_dofs), np.diff(pattern.indptr)) // DOFS, pattern.indices // DOFS
-    pairs = np.repeat(np.arange(n), np.diff(pattern.neighbour_start)) * n + pattern.neighbour  # rising
-    return np.where(a == b, -1, np.searchsorted(pairs, a * n + b))
-
-
 def analyse(pattern: Pattern, pair: Ints, coupled: NDArray[np.bool_]) -> Analysis:
     """The order of elimination and the fronts of a matrix in which some node pairs are coupled, the others not.
 
-    `pair` (nnz,) is what `pair_of_entry` gives, `coupled` tells of each pair whether it counts.
+    `pair` (nnz,) is what `circuittex.mech.coupled.pair_of_entry` gives, `coupled` tells of each pair whether it counts.
     """
     graph = _graph(pattern, coupled)
     order = _minimum_degree(graph)

@@ -17,6 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from circuittex.geometry.mesh import Floats
+from circuittex.mech.coupled import Coupled
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import Pattern
 
@@ -43,7 +44,7 @@ def best_solver() -> LinearSolver:
 
 
 class CholmodSolver:
-    """CHOLMOD's supernodal Cholesky as cvxopt brings it; its symbolic analysis is kept while the pattern holds."""
+    """CHOLMOD's supernodal Cholesky as cvxopt brings it; its analysis is kept while the same pairs are coupled."""
 
     name = "cholmod"
 
@@ -51,20 +52,20 @@ class CholmodSolver:
         from cvxopt import cholmod, matrix, spmatrix
 
         self._cholmod, self._dense, self._sparse = cholmod, matrix, spmatrix
-        self._pattern: Pattern | None = None
+        self._coupled = Coupled()
         self._matrix: Any = None
         self._factor: Any = None
 
     def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
         """A function that solves with the matrix (until the next call), or None if it is not positive definite."""
-        if pattern is not self._pattern:  # the upper triangle by rows is the lower triangle by columns
-            columns = np.repeat(np.arange(pattern.n_dofs), np.diff(pattern.indptr))
+        if self._coupled.renew(pattern, data):  # the upper triangle by rows is the lower triangle by columns
+            entries = self._coupled.entries
+            columns = np.repeat(np.arange(pattern.n_dofs), np.diff(self._coupled.start()))
             shape = (pattern.n_dofs, pattern.n_dofs)
-            entries = (self._dense(part) for part in (data, pattern.indices, columns))
-            self._matrix = self._sparse(*entries, shape)
+            triplets = (self._dense(part) for part in (data[entries], pattern.indices[entries], columns))
+            self._matrix = self._sparse(*triplets, shape)
             self._factor = self._cholmod.symbolic(self._matrix)
-            self._pattern = pattern
-        self._matrix.V = self._dense(data)
+        self._matrix.V = self._dense(data[self._coupled.entries])
         try:
             self._cholmod.numeric(self._matrix, self._factor)
         except ArithmeticError:  # cvxopt's word for a pivot that is not positive
@@ -79,7 +80,7 @@ class CholmodSolver:
 
 
 class PardisoSolver:
-    """Intel MKL's PARDISO through pypardiso: Cholesky, its symbolic analysis kept while the pattern holds."""
+    """Intel MKL's PARDISO through pypardiso: Cholesky, its symbolic analysis kept while the same pairs are coupled."""
 
     name = "pardiso"
     _CHOLESKY, _ANALYSE, _FACTOR, _SOLVE, _RELEASE = 2, 11, 22, 33, -1
@@ -89,7 +90,8 @@ class PardisoSolver:
     whatever their number, so that the result has the same bits on any number."""
 
     def __init__(self) -> None:
-        self._pattern: Pattern | None = None
+        self._coupled = Coupled()
+        self._matrix: Any = None
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # pypardiso warns about its own optional dependencies
             import pypardiso
@@ -100,7 +102,6 @@ class PardisoSolver:
         os.environ.setdefault("PYPARDISO_MKL_RT", self._pardiso.libmkl._name)
         for place, value in self._SETTINGS:
             self._pardiso.set_iparm(place, value)
-        self._matrix: Any = None
 
     def _call(self, phase: int, b: Floats) -> Floats:
         self._pardiso.set_phase(phase)
@@ -109,14 +110,13 @@ class PardisoSolver:
     def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
         """A function that solves with the matrix (until the next call), or None if it is not positive definite."""
         nothing = np.zeros(pattern.n_dofs)
-        if pattern is not self._pattern:
-            if self._pattern is not None:
-                self._call(self._RELEASE, np.zeros(self._pattern.n_dofs))
-            shape = (pattern.n_dofs, pattern.n_dofs)
-            self._matrix = sp.csr_matrix((data, pattern.indices, pattern.indptr), shape=shape)
+        if self._coupled.renew(pattern, data):
+            self._release()
+            entries = self._coupled.entries
+            parts = data[entries], pattern.indices[entries], self._coupled.start()
+            self._matrix = sp.csr_matrix(parts, shape=(pattern.n_dofs, pattern.n_dofs))
             self._call(self._ANALYSE, nothing)
-            self._pattern = pattern
-        self._matrix.data = data
+        self._matrix.data = data[self._coupled.entries]
         try:
             self._call(self._FACTOR, nothing)
         except self._error as error:
@@ -125,6 +125,11 @@ class PardisoSolver:
             raise
         return lambda b: self._call(self._SOLVE, b)
 
+    def _release(self) -> None:
+        if self._matrix is not None:
+            self._call(self._RELEASE, np.zeros(self._matrix.shape[0]))
+            self._matrix = None
+
     def __del__(self) -> None:
-        if self._pattern is not None and not sys.is_finalizing():  # at exit the system takes the memory back
-            self._call(self._RELEASE, np.zeros(self._pattern.n_dofs))
+        if not sys.is_finalizing():  # at exit the system takes the memory back
+            self._release()

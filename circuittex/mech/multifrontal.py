@@ -14,11 +14,11 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from circuittex.compiled import compiled
 from circuittex.geometry.mesh import Floats, Ints
-from circuittex.mech.fronts import Analysis, Front, analyse, pair_of_entry
+from circuittex.mech.coupled import Coupled
+from circuittex.mech.fronts import Analysis, Front, analyse
 from circuittex.mech.pattern import Pattern
 
 BLOCK = 64
@@ -42,22 +42,15 @@ class MultifrontalSolver:
     name = "multifrontal"
 
     def __init__(self) -> None:
-        self._pattern: Pattern | None = None
-        self._pair: Ints
-        self._coupled: NDArray[np.bool_]
-        self._analysis: Analysis | None = None
+        self._coupled = Coupled()
+        self._analysis: Analysis
         self._values: Floats
         self._panels: list[Floats]
 
     def factor(self, pattern: Pattern, data: Floats) -> Callable[[Floats], Floats] | None:
         """A function that solves with the matrix (until the next call), or None if a pivot is not positive."""
-        if pattern is not self._pattern:
-            self._pattern, self._pair = pattern, pair_of_entry(pattern)
-            self._analysis = None
-        coupled = np.zeros(len(pattern.neighbour), dtype=bool)
-        coupled[self._pair[(data != 0.0) & (self._pair >= 0)]] = True
-        if self._analysis is None or np.any(coupled & ~self._coupled):
-            self._coupled, self._analysis = coupled, analyse(pattern, self._pair, coupled)
+        if self._coupled.renew(pattern, data):
+            self._analysis = analyse(pattern, self._coupled.pair, self._coupled.pairs)
             self._values = np.empty(self._analysis.size)
             self._panels = [
                 self._values[front.start :][: front.pivots * len(front.rows)].reshape(front.pivots, -1)

@@ -207,7 +207,7 @@ def test_penalty_scales_energy_and_force() -> None:
 @pytest.mark.parametrize("mesh", CASES[:1])
 def test_threads_do_not_change_a_bit(mesh: FibrilMesh, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = forces(mesh)
-    monkeypatch.setattr("circuittex.contact.penalty.os.cpu_count", lambda: 1)
+    monkeypatch.setattr("circuittex.contact.penalty.cores", lambda: 1)
     alone = forces(mesh)
     assert alone[0] == expected[0]
     assert np.array_equal(alone[1], expected[1])

@@ -6,6 +6,7 @@ worker in this process.
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -23,13 +24,18 @@ import pytest
 import circuittex.ensemble.cluster as cluster_module
 from circuittex.design import plain_weave
 from circuittex.ensemble import run_ensemble
-from circuittex.ensemble.cluster import each_result, local_client, remote_client
+from circuittex.ensemble.cluster import each_result, local_client, remote_client, sees
 from circuittex.ensemble.perturbation import member_design, perturbed
-from circuittex.errors import CircuittexError, DesignError
+from circuittex.errors import CircuittexError, DesignError, WorkerError
 from circuittex.geometry.mesh import Floats
 from circuittex.lock import HOLDER
 from circuittex.study import run_study
 
+# what Dask says on a machine without a network
+pytestmark = pytest.mark.filterwarnings("ignore:Couldn't detect a suitable IP address")
+
+DEADLINE = 120.0
+"""Seconds within which a worker must have started on a machine that is busy."""
 TINY = plain_weave(yarns=2, rows=(1,))
 TINY = replace(TINY, numerics=replace(TINY.numerics, elements=3), probes=(), terminals=())
 
@@ -81,7 +87,9 @@ def test_whatever_happens_to_workers_and_tasks_the_others_go_on(tmp_path: Path) 
 
         # what is still going on when the block is left ends with it
         client.submit(never_ends, str(endless), pure=False)
+        deadline = time.monotonic() + DEADLINE
         while not (endless.exists() and endless.read_text()):
+            assert time.monotonic() < deadline
             time.sleep(0.05)
         pid = int(endless.read_text())
         assert alive(pid)
@@ -153,12 +161,31 @@ def test_workers_that_do_not_see_the_folder_are_named(
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://a", "127.0.0.1:x"])
-def test_an_address_where_nobody_answers_is_named(
+def test_an_address_where_nobody_answers_is_named_and_nothing_is_left_open(
     address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """The garbage collector would close a client that was left, perhaps while another one starts its event loop: it
+    would wait for ever for a lock that its own thread holds."""
     monkeypatch.setattr(cluster_module, "PATIENCE", 0.5)
-    with pytest.raises(DesignError, match=r"--scheduler.*no Dask scheduler answers"):
-        run_ensemble(TINY, tmp_path, members=1, address=address)
+    gc.collect()
+    gc.disable()
+    try:
+        with pytest.raises(DesignError, match=r"--scheduler.*no Dask scheduler answers"):
+            run_ensemble(TINY, tmp_path, members=1, address=address)
+        clients = [thing for thing in gc.get_objects() if type(thing) is distributed.Client]
+    finally:
+        gc.enable()
+    assert not [client for client in clients if client.status != "closed"]
+
+
+def test_workers_that_are_gone_are_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster_module, "PATIENCE", 0.2)
+    with (
+        distributed.LocalCluster(n_workers=0, processes=False, dashboard_address="127.0.0.1:0") as cluster,
+        distributed.Client(cluster, set_as_default=False) as client,
+        pytest.raises(WorkerError, match="none has come back"),
+    ):
+        list(each_result(client, sees, {0: ("nowhere",)}))
 
 
 def test_a_scheduler_without_workers_is_told_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

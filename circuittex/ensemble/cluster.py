@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
 import os
@@ -12,7 +13,7 @@ from concurrent.futures import CancelledError
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from circuittex.errors import CircuittexError, DesignError
+from circuittex.errors import CircuittexError, DesignError, WorkerError
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
@@ -31,14 +32,6 @@ SETTINGS = {
 
 _Key = TypeVar("_Key", bound=Hashable)
 _Result = TypeVar("_Result")
-
-
-def default_workers() -> int:
-    """The cores that this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on Windows and macOS
-        return os.cpu_count() or 1
 
 
 @contextlib.contextmanager
@@ -72,10 +65,12 @@ def remote_client(address: str, folder: Path) -> Iterator[Client]:
     """
     distributed = _distributed()
     try:
-        client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
+        # Before there is a client: one that fails to connect is closed by the garbage collector, which blocks for ever
+        # where it happens to run while another client starts its event loop.
+        asyncio.run(_call(distributed, address))
     except (OSError, TimeoutError, ValueError, TypeError) as error:
         raise DesignError("--scheduler", address, f"no Dask scheduler answers there ({error})") from error
-    with client:
+    with distributed.Client(address, timeout=PATIENCE, set_as_default=False) as client:
         try:
             client.wait_for_workers(1, timeout=PATIENCE)
         except TimeoutError:
@@ -87,6 +82,12 @@ def remote_client(address: str, folder: Path) -> Iterator[Client]:
             allowed = f"it must be a folder that all workers share; the worker at {blind[0]} does not see it"
             raise DesignError("results folder", str(folder), allowed)
         yield client
+
+
+async def _call(distributed: Any, address: str) -> None:
+    """Connect to `address` and hang up; raises where nobody answers."""
+    comm = await distributed.comm.connect(address, timeout=PATIENCE)
+    await comm.close()
 
 
 def sees(path: str) -> bool:
@@ -101,14 +102,25 @@ def each_result(
 
     A task that raises is tried again, and so is one whose worker dies; what it still raises after that is yielded.
     Tasks that have not begun are withdrawn where the caller stops.
+
+    Raises `WorkerError` where all workers are gone and none comes back for `PATIENCE` seconds.
     """
-    from distributed import as_completed
+    from distributed import wait
 
     futures = {client.submit(task, *values, pure=False, retries=RETRIES): key for key, values in arguments.items()}
+    pending, looks = set(futures), 0
     try:
-        for future in as_completed(list(futures), loop=client.loop):
-            yield futures[future], _outcome(future)
-            future.release()
+        while pending:
+            with contextlib.suppress(TimeoutError, CancelledError), client.as_current():
+                wait(pending, timeout=PATIENCE, return_when="FIRST_COMPLETED")
+            done = {future for future in pending if future.done()}
+            pending -= done
+            for future in done:
+                yield futures[future], _outcome(future)
+                future.release()
+            looks = 0 if done or client.nthreads() else looks + 1
+            if looks > 1:
+                raise WorkerError("the Dask workers are gone, and none has come back")
     finally:
         client.cancel(list(futures), force=True)
 

@@ -18,7 +18,9 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+import scipy.sparse as sp
 from measure import Table, arguments, paired, publish, ratio
+from scipy.sparse.linalg import splu
 from watch import BEAM, CLOSEST, CONTACT, ENERGY, FACTOR, PARTS, SOLVE, Stopwatch, descend
 
 from circuittex.contact.penalty import PenaltyContact
@@ -33,6 +35,7 @@ from circuittex.mech.pattern import Pattern
 from circuittex.mech.space import BeamSpace
 from circuittex.mech.terms import ForceTerm
 from circuittex.relaxation import force_terms
+from circuittex.transfer import transfer
 
 PART_HEAD = ["part", "calls an iteration", "ms a call", "% of the time"]
 SOLVER_HEAD = [
@@ -50,24 +53,36 @@ LOOSE = 0.02
 
 
 def coarse_state(design: Design, solver: LinearSolver) -> Configuration:
-    """The loosely relaxed cell on longer quadratic elements, read at the nodes of the design's own mesh."""
+    """The loosely relaxed cell on longer elements, carried over to the design's own mesh."""
     coarse = replace(design, numerics=replace(design.numerics, elements=design.numerics.elements // COARSER))
     mesh = build_mesh(coarse)
     terms = force_terms(mesh, coarse)
     start = terms[0].vector(initial_configuration(mesh))
-    x = terms[0].configuration(descend(terms, start, solver, coarse.numerics.max_iterations, LOOSE)[0]).x
-    t = np.linspace(0.0, 1.0, 2 * COARSER + 1)
-    shape = np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=1)
-    fine = np.einsum("ta,eapc->etpc", shape, x[mesh.elements])
-    by_fibril = fine.reshape(mesh.n_fibrils, -1, len(t), 3, 3)
-    inner = by_fibril[:, :, :-1].reshape(mesh.n_fibrils, -1, 3, 3)  # an element's last node is the next one's first
-    return Configuration(np.concatenate([inner, by_fibril[:, -1:, -1]], axis=1).reshape(-1, 3, 3))
+    q, *_ = descend(terms, start, solver, coarse.numerics.max_iterations, LOOSE)
+    return transfer(terms[0].configuration(q), mesh, build_mesh(design))
+
+
+class SuperLU:
+    """SciPy's general sparse factorisation of the same matrix, ordered anew each time: what there is without any of
+    circuittex's solvers."""
+
+    name = "scipy splu"
+
+    def factor(self, pattern: Pattern, data: Floats) -> Solve:
+        """A function that solves with the matrix, zeros left out."""
+        shape = (pattern.n_dofs, pattern.n_dofs)
+        upper = sp.csr_array((data, pattern.indices, pattern.indptr), shape=shape)
+        full = (upper + sp.triu(upper, 1).T).tocsc()
+        full.eliminate_zeros()
+        options = {"SymmetricMode": True, "Equil": False}
+        solve: Solve = splu(full, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).solve
+        return solve
 
 
 def installed() -> list[Callable[[], LinearSolver]]:
-    """The solvers that can be had here, the fastest first."""
+    """The solvers that can be had here, the fastest first, and SciPy's own as the peer of all."""
     extras: list[tuple[Callable[[], LinearSolver], str]] = [(PardisoSolver, "pypardiso"), (CholmodSolver, "cvxopt")]
-    return [*(solver for solver, package in extras if importlib.util.find_spec(package)), MultifrontalSolver]
+    return [*(solver for solver, package in extras if importlib.util.find_spec(package)), MultifrontalSolver, SuperLU]
 
 
 def part_rows(watch: Stopwatch) -> list[list[object]]:

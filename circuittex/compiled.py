@@ -22,7 +22,11 @@ def compiled(function: F) -> F:
     return kernel
 
 
+def available_cores() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+
+
 def cores() -> int:
     """How many threads may run compiled functions: NUMBA_NUM_THREADS, and no more than this process has cores."""
-    own = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
-    return min(own, int(config.NUMBA_NUM_THREADS))
+    return min(available_cores(), int(config.NUMBA_NUM_THREADS))

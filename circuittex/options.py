@@ -84,7 +84,7 @@ def _add_run(commands: Commands) -> None:
         "says that it did not check.",
         "circuittex run examples/plain_weave.toml --out results/plain_weave",
     )
-    parser.add_argument("design", metavar="DESIGN", type=Path, help="design file (TOML); see 'circuittex new'")
+    _add_design(parser)
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder of the results; made if missing")
     parser.add_argument(
         "--fresh",
@@ -105,7 +105,6 @@ def _add_run(commands: Commands) -> None:
         help="processes that compute loading paths beside one another, at most one for each path (default: the cores "
         "there are); the numbers do not depend on it",
     )
-    parser.add_argument("--quiet", action="store_true", help="show no progress and no closing table")
 
 
 def _add_netlist(commands: Commands) -> None:
@@ -182,7 +181,7 @@ def _add_ensemble(commands: Commands) -> None:
         "extra 'circuittex[ensemble]'. However it ends, the same command goes on; it may ask for more members.",
         "circuittex ensemble examples/plain_weave.toml --members 32",
     )
-    parser.add_argument("design", metavar="DESIGN", type=Path, help="design file (TOML); see 'circuittex new'")
+    _add_design(parser)
     parser.add_argument("--members", metavar="N", type=int, required=True, help="how many packings")
     parser.add_argument(
         "--out", metavar="DIR", type=Path, help="folder of the results (default: results/NAME-ensemble)"
@@ -195,6 +194,10 @@ def _add_ensemble(commands: Commands) -> None:
         metavar="ADDRESS",
         help="a running Dask scheduler, such as tcp://node1:8786; its workers need circuittex and must share DIR",
     )
+
+
+def _add_design(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("design", metavar="DESIGN", type=Path, help="design file (TOML); see 'circuittex new'")
     parser.add_argument("--quiet", action="store_true", help="show no progress and no closing table")
 
 

@@ -12,7 +12,7 @@ from circuittex.frozen import frozen, same
 from circuittex.geometry.mesh import FibrilMesh, Floats
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
-from circuittex.mech.equilibrium import minimise, predict
+from circuittex.mech.equilibrium import minimise
 from circuittex.mech.linear import LinearSolver, best_solver
 from circuittex.mech.space import BeamSpace, beam_space
 
@@ -57,23 +57,21 @@ def relax(
 ) -> Equilibrium:
     """The equilibrium that descent from `start` (by default the initial weave) reaches, ends held as there.
 
-    Where `start` was moved from the equilibrium `before`, the first step takes the tangent of that (`predict`). The
+    Where `start` was moved from the equilibrium `before`, the descent starts from what that predicts. The
     ends of yarns along `free`, 'x' or 'y', are not held.
 
     Raises `ConvergenceError` with the history where it is not reached.
     """
     space, beam, contact = force_terms(mesh, design, free)
-    solver = solver if solver is not None else best_solver()
     start = start if start is not None else initial_configuration(mesh)
-    q, moved = space.vector(start), before is not None and not same(before, start)
-    if before is not None and moved:
-        q = predict([beam, contact], space.vector(before), q, mass=beam.mass, fixed=space.fixed, solver=solver)
+    moved = before is not None and not same(before, start)
     minimum = minimise(
         [beam, contact],
-        q,
+        space.vector(start),
         mass=beam.mass,
         fixed=space.fixed,
-        solver=solver,
+        solver=solver if solver is not None else best_solver(),
+        before=space.vector(before) if before is not None and moved else None,
         tolerance=design.numerics.tolerance,
         max_iterations=design.numerics.max_iterations,
         report=report,
@@ -84,7 +82,7 @@ def relax(
         section_force=beam.section_force(minimum.q),
         energy=minimum.energy,
         residual=minimum.residual,
-        iterations=minimum.iterations + moved,
+        iterations=minimum.iterations,
         history=minimum.history,
     )
 

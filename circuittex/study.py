@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
@@ -10,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from circuittex import __version__
+from circuittex.compiled import available_cores
 from circuittex.design import Design, design_hash
 from circuittex.discretisation import ErrorEstimate
 from circuittex.error_estimate import estimate_errors, variants, without_estimate
@@ -130,7 +130,7 @@ def _compute(study: Study, workers: int, solver: Callable[[], LinearSolver], say
     workers = min(workers, len(paths))  # more would wait for one another
     if workers <= 1:
         return compute(study, Here(say), solver, keep)
-    pool = Pool(workers, threads=max(1, cores() // workers), say=say)
+    pool = Pool(workers, threads=max(1, available_cores() // workers), say=say)
     try:
         first = {}
         if not study.records:  # nothing else can be done yet: this process has all cores for it
@@ -151,20 +151,15 @@ def _estimate(
     workers = min(workers, len(without_estimate(study)))
     if workers <= 1:
         return estimate_errors(study, Here(say), solver, keep)
-    with closing(Pool(workers, threads=max(1, cores() // workers), say=say)) as pool:
+    with closing(Pool(workers, threads=max(1, available_cores() // workers), say=say)) as pool:
         return estimate_errors(study, pool, solver, keep)
-
-
-def cores() -> int:
-    """The cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _workers(asked: int | None) -> int:
     """The number of processes to use at most."""
     if asked is not None and (not isinstance(asked, int) or asked < 1):
         raise DesignError("workers", asked, "it must be a whole number of at least 1")
-    return cores() if asked is None else asked
+    return available_cores() if asked is None else asked
 
 
 def _with(study: Study, record: Record) -> Study:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,17 @@ from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.space import beam_space
+from circuittex.relaxation import Equilibrium
+
+
+@dataclass
+class Cell:
+    """A woven cell in two states."""
+
+    design: Design
+    mesh: FibrilMesh
+    relaxed: Equilibrium
+    stretched: Equilibrium
 
 
 def fibrils_through(

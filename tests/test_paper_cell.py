@@ -5,18 +5,17 @@ These are the only tests that relax the full cell of 80 fibrils.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
+from fabrics import Cell
 
 from circuittex.contact.extract import contacts_of
 from circuittex.design import Design, plain_weave
 from circuittex.fields import solve_probes
 from circuittex.geometry.levels import levels
-from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
-from circuittex.relaxation import Equilibrium, clamp_force, move, relax
+from circuittex.increment import advance
+from circuittex.relaxation import clamp_force, relax
 
 MOST_ITERATIONS = 80
 """What a relaxation of this cell, and any step of 2.5 %, may take."""
@@ -25,21 +24,14 @@ SYMMETRY = 1e-5
 residual of 1e-6 N on either side of a force of about 1 N, and its amplification by the softest mode."""
 
 
-@dataclass
-class Cell:
-    design: Design
-    mesh: FibrilMesh
-    relaxed: Equilibrium
-    stretched: Equilibrium
-
-
 @pytest.fixture(scope="module", params=["paper-code", "paper-table"])
 def cell(request: pytest.FixtureRequest) -> Cell:
     design = plain_weave(request.param)
     mesh = build_mesh(design)
     relaxed = relax(mesh, design)
-    start = move(relaxed.configuration, np.eye(2), np.diag([1.025, 1.0]))
-    return Cell(design, mesh, relaxed, relax(mesh, design, start))
+    step = advance(mesh, design, relaxed.configuration, np.eye(2), np.diag([1.025, 1.0]))
+    assert step.parts == 1
+    return Cell(design, mesh, relaxed, step.equilibrium)
 
 
 def wave_force(design: Design) -> float:

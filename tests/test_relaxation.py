@@ -15,7 +15,7 @@ from circuittex.frozen import same
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
-from circuittex.mech.equilibrium import predict
+from circuittex.mech.equilibrium import System, predict
 from circuittex.mech.linear import Solve
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import Pattern
@@ -257,7 +257,7 @@ def test_a_prediction_is_of_second_order(cell: Cell) -> None:
     def distances(strain: float) -> np.ndarray:
         moved = move(relaxed.configuration, np.eye(2), np.diag([1 + strain, 1.0]))
         to = space.vector(moved)
-        predicted = predict([beam, contact], q, to, mass=beam.mass, fixed=space.fixed, solver=solver)
+        predicted = predict(System([beam, contact], beam.mass, space.fixed, len(q)), solver, q, to)
         goal = relax(mesh, design, moved, before=relaxed.configuration, solver=solver).configuration.r
         return np.array([np.abs(r - goal).max() for r in (moved.r, space.configuration(predicted).r)])
 

@@ -17,6 +17,7 @@ import pytest
 from canned import Canned, canned_study, files, report, untimed
 from fabrics import small_cell
 
+from circuittex.compiled import available_cores
 from circuittex.design import Design, equal_steps, shear, uniaxial
 from circuittex.errors import ConvergenceError, DesignError, FolderError, StoreError
 from circuittex.frozen import same
@@ -24,7 +25,7 @@ from circuittex.lock import locked
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.store import load_study
 from circuittex.store.archive import Digests
-from circuittex.study import cores, run_study
+from circuittex.study import run_study
 
 STUDY = canned_study(2)
 PATIENCE = 600.0
@@ -98,6 +99,7 @@ import circuittex.folder
 import test_study
 from canned import report
 circuittex.folder.write_report = report
+from circuittex.compiled import available_cores
 from circuittex.study import run_study
 run_study(test_study.cell(), sys.argv[2], workers=int(sys.argv[3]))
 """
@@ -163,7 +165,7 @@ def test_one_path_needs_no_other_process(monkeypatch: pytest.MonkeyPatch) -> Non
     Canned(study).install(monkeypatch)
     monkeypatch.setattr("circuittex.study.Pool", None)
     assert same(run_study(study.design, workers=8), study)
-    assert cores() >= 1
+    assert available_cores() >= 1
 
 
 def test_a_path_that_does_not_converge_keeps_the_rest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

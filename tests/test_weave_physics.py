@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from fabrics import fibrils_through, renumbered, small_cell, straight
+from fabrics import Cell, fibrils_through, renumbered, small_cell, straight
 
 from circuittex.circuit import CONTACT, build_circuit
 from circuittex.contact.extract import contact_state
 from circuittex.contact.law import hertz_width
 from circuittex.contact.merge import snap_feet
 from circuittex.contact.state import ContactState
-from circuittex.design import ContactLaw, Design, Probe, Terminal, plain_weave, uniaxial
+from circuittex.design import ContactLaw, Probe, Terminal, plain_weave, uniaxial
 from circuittex.fields import Fields, solve_probes
 from circuittex.fit import fit_network
 from circuittex.frozen import same
@@ -26,21 +26,13 @@ from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.netlist import deck, parse
 from circuittex.ngspice import run_deck
 from circuittex.nodal import solve_nodal
-from circuittex.relaxation import Equilibrium, clamp_force, move, relax
+from circuittex.relaxation import clamp_force, move, relax
 from circuittex.results import Study
 from circuittex.store import load_study
 from circuittex.study import run_study
 from circuittex.summary import summary
 
 STRETCHED = np.diag([1.05, 1.0])
-
-
-@dataclass
-class Cell:
-    design: Design
-    mesh: FibrilMesh
-    relaxed: Equilibrium
-    stretched: Equilibrium
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from circuittex import __version__
+from circuittex.compiled import available_cores
 from circuittex.design import Design, design_hash
 from circuittex.design.checks import whole
-from circuittex.ensemble.cluster import default_workers, each_result, local_client, remote_client
+from circuittex.ensemble.cluster import each_result, local_client, remote_client
 from circuittex.ensemble.files import open_folder, write_results
 from circuittex.ensemble.member import Outcome, compute_member, read_outcome
 from circuittex.ensemble.perturbation import member_design, perturbed
@@ -81,7 +82,7 @@ def run_ensemble(
 def _client(folder: Path, address: str | None, workers: int | None, tasks: int) -> AbstractContextManager[Client]:
     if address is not None:
         return remote_client(address, folder)
-    return local_client(min(workers or default_workers(), tasks))
+    return local_client(min(workers or available_cores(), tasks))
 
 
 def _computed(

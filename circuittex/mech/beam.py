@@ -150,20 +150,18 @@ class Beam:
         n = self.space.element_slots.shape[1]
         line = (mesh.density * mesh.area)[fibril]
         inertia = np.stack([line, line * mesh.radius[fibril] ** 2 / 4, line * mesh.radius[fibril] ** 2 / 4], axis=1)
-        tangent = np.zeros((len(fibril), n, DOFS, n, DOFS))
+        matrix = np.zeros((len(fibril), n, DOFS, n, DOFS))
         k = np.arange(DOFS)
-        tangent[:, :, k, :, k] = np.moveaxis(self.space.mass_line[..., None] * inertia[:, None, None, k // 3], -1, 0)
+        matrix[:, :, k, :, k] = np.moveaxis(self.space.mass_line[..., None] * inertia[:, None, None, k // 3], -1, 0)
         data = np.zeros(pattern.nnz)
         add_elements(
             self.space.element_slots,
-            np.zeros((len(fibril), n, DOFS)),
-            tangent,
+            matrix,
             pattern.indptr,
             pattern.neighbour_start,
             pattern.neighbour,
             pattern.point_offset,
             pattern.full_offset,
-            np.zeros(pattern.n_dofs),
             data,
         )
         return data

@@ -61,13 +61,13 @@ class Minimum:
     residual: float
     """Largest magnitude of the gradient on the free unknowns, N."""
     iterations: int
-    """Newton iterations (linear solves) spent."""
+    """Linear systems solved: Newton iterations, and one for the prediction where there was one."""
     history: Floats
-    """(iterations + 1, 4) residual N, potential N mm, shift, step length of each."""
+    """(Newton iterations + 1, 4) residual N, potential N mm, shift, step length of each."""
 
 
 @dataclass
-class _System:
+class System:
     """Pattern, mass and the values assembled in it; renewed when a term's couplings change."""
 
     terms: Sequence[ForceTerm]
@@ -108,31 +108,6 @@ class _System:
         return sum(term.energy(q) for term in self.terms)
 
 
-def predict(
-    terms: Sequence[ForceTerm],
-    q: Floats,
-    moved: Floats,
-    *,
-    mass: Callable[[Pattern], Floats],
-    fixed: Ints,
-    solver: LinearSolver,
-) -> Floats:
-    """Where a minimum q (n_dofs,) goes to first order when its prescribed unknowns move to those of `moved`.
-
-    With the tangent K at q and the free unknowns f, the minimum moves by dq with (K dq)_f = 0; this is solved for the
-    difference to `moved`, a first guess. `moved` itself is returned where its potential is the lower one.
-    """
-    system = _System(terms, mass, fixed, len(q))
-    pattern, _, _ = system.assemble(q)
-    force = multiply(pattern, system.data + system.softening, moved - q)
-    force[fixed] = 0.0
-    solve = system.factor(solver, FIRST_SHIFT, 1.0)
-    if solve is None:
-        return moved
-    predicted = moved - solve(force)
-    return predicted if system.energy(predicted) < system.energy(moved) else moved
-
-
 def minimise(
     terms: Sequence[ForceTerm],
     q: Floats,
@@ -140,19 +115,23 @@ def minimise(
     mass: Callable[[Pattern], Floats],
     fixed: Ints,
     solver: LinearSolver,
+    before: Floats | None = None,
     tolerance: float = 1e-6,
     max_iterations: int = 200,
     report: Callable[[int, float], None] | None = None,
 ) -> Minimum:
     """The minimum of the terms' total potential that a descent from q (n_dofs,) reaches.
 
-    `mass` gives the mass matrix in a pattern; `fixed` are the prescribed unknowns, kept as they are in q;
-    `tolerance` (N) bounds the largest free force; `report` is told of every iteration.
+    `mass` gives the mass matrix in a pattern; `fixed` are the prescribed unknowns, kept as they are in q; where q was
+    moved from the minimum `before`, the descent starts from what that predicts (`predict`); `tolerance` (N) bounds the
+    largest free force; `report` is told of every iteration.
 
     Raises `ConvergenceError`, with the history, where the tolerance is not met in `max_iterations`: an
     unconverged state is never returned.
     """
-    system = _System(terms, mass, fixed, len(q))
+    system = System(terms, mass, fixed, len(q))
+    if before is not None:
+        q = predict(system, solver, before, q)
     shift, part, refused, step, history = FIRST_SHIFT, 0, False, 1.0, []
     free = np.ones(len(q), dtype=bool)
     free[fixed] = False
@@ -168,7 +147,8 @@ def minimise(
         if not np.isfinite(energy):
             raise ConvergenceError("the potential is infinite: a fibril's section is inside out", np.array(history))
         if residual <= tolerance and system.factor(solver, FIRST_SHIFT, 1.0) is not None:
-            return Minimum(q, gradient, energy, residual, iteration, np.array(history))
+            solves = iteration + (before is not None)
+            return Minimum(q, gradient, energy, residual, solves, np.array(history))
         if iteration == max_iterations:
             break
         rough = residual > ROUGH * np.abs(gradient).max()
@@ -194,8 +174,24 @@ def minimise(
     raise ConvergenceError(f"{message}, {tolerance:.3g} N was asked for", np.array(history))
 
 
+def predict(system: System, solver: LinearSolver, q: Floats, moved: Floats) -> Floats:
+    """Where a minimum q (n_dofs,) goes to first order when its prescribed unknowns move to those of `moved`.
+
+    With the tangent K at q and the free unknowns f, the minimum moves by dq with (K dq)_f = 0; this is solved for the
+    difference to `moved`, a first guess. `moved` itself is returned where its potential is the lower one.
+    """
+    pattern, _, _ = system.assemble(q)
+    force = multiply(pattern, system.data + system.softening, moved - q)
+    force[system.fixed] = 0.0
+    solve = system.factor(solver, FIRST_SHIFT, 1.0)
+    if solve is None:
+        return moved
+    predicted = moved - solve(force)
+    return predicted if system.energy(predicted) < system.energy(moved) else moved
+
+
 def _positive(
-    system: _System,
+    system: System,
     solver: LinearSolver,
     shift: float,
     parts: Sequence[float],
@@ -216,7 +212,7 @@ def _positive(
 
 
 def _escape(
-    system: _System, pattern: Pattern, solve: Solve, q: Floats, energy: float, free: NDArray[np.bool_]
+    system: System, pattern: Pattern, solve: Solve, q: Floats, energy: float, free: NDArray[np.bool_]
 ) -> Floats | None:
     """A lower point along the mode of the lowest curvature, found by inverse iteration with the shifted factor; None
     where there is none within sight.
@@ -236,7 +232,7 @@ def _escape(
     return best
 
 
-def _search(system: _System, q: Floats, direction: Floats, energy: float, slope: float) -> float:
+def _search(system: System, q: Floats, direction: Floats, energy: float, slope: float) -> float:
     """Step length in {1, 1/2, 1/4, ...} that lowers the potential enough; 0 if none does."""
     step = 1.0
     for _ in range(12):

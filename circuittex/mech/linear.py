@@ -1,8 +1,8 @@
 """Direct solvers for the tangent, behind one small interface that also answers "is it positive definite?".
 
 A solver's `factor` takes the pattern and the values of a symmetric matrix and returns a function that
-solves with it, or None where a pivot is not positive. Work that depends on the pattern alone is kept while
-the same `Pattern` object comes back.
+solves with it, or None where a pivot is not positive. The symbolic analysis is kept while the same `Pattern` object
+comes back and its values couple no node pair that was not coupled before (`circuittex.mech.coupled`).
 """
 
 from __future__ import annotations

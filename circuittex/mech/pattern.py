@@ -110,26 +110,23 @@ def find_neighbour(start: Any, neighbour: Any, a: int, b: int) -> int:
 @compiled
 def add_elements(
     slots: Any,
-    gradient: Any,
-    tangent: Any,
+    matrix: Any,
     indptr: Any,
     start: Any,
     neighbour: Any,
     point_offset: Any,
     full_offset: Any,
-    total: Any,
     data: Any,
 ) -> None:
-    """Add element gradients (M, n, 9) and tangents (M, n, 9, n, 9) to the vector and the matrix values."""
+    """Add symmetric element matrices (M, n, 9, n, 9) to the matrix values."""
     nodes = slots.shape[1]
     for e in range(slots.shape[0]):
         for i in range(nodes):
             a = slots[e, i]
             for k in range(9):
-                total[9 * a + k] += gradient[e, i, k]
                 at = indptr[9 * a + k]
                 for m in range(k, 9):
-                    data[at + m - k] += tangent[e, i, k, i, m]
+                    data[at + m - k] += matrix[e, i, k, i, m]
             for j in range(i + 1, nodes):
                 b = slots[e, j]
                 low, high = min(a, b), max(a, b)
@@ -138,7 +135,7 @@ def add_elements(
                     offset = point_offset[n] if k < 3 else full_offset[n]
                     at = indptr[9 * low + k] + 9 - k + offset
                     for m in range(9):
-                        data[at + m] += tangent[e, i, k, j, m] if a < b else tangent[e, i, m, j, k]
+                        data[at + m] += matrix[e, i, k, j, m] if a < b else matrix[e, i, m, j, k]
 
 
 def diagonal(pattern: Pattern) -> Ints:

@@ -8,11 +8,15 @@ from beams import dense
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 import circuittex.mech.fronts as fronts
+from circuittex.design import plain_weave
 from circuittex.geometry.mesh import Ints
+from circuittex.geometry.weave import build_mesh
 from circuittex.mech.coupled import pair_of_entry
-from circuittex.mech.fronts import Analysis
+from circuittex.mech.dissection import minimum_degree
+from circuittex.mech.fronts import Analysis, Front
 from circuittex.mech.pattern import Pattern, build_pattern
 
 NOTHING = np.empty((0, 2), dtype=np.int64)
@@ -24,7 +28,8 @@ def patterns(draw: st.DrawFn) -> Pattern:
     n = draw(st.integers(1, 10))
     pairs = st.lists(st.tuples(st.integers(0, n - 1), st.integers(0, n - 1)), max_size=14)
     full, point = (np.array(draw(pairs), dtype=np.int64).reshape(-1, 2) for _ in range(2))
-    return build_pattern(n, full, point)
+    position = np.array(draw(st.lists(st.integers(0, 3), min_size=3 * n, max_size=3 * n)), dtype=float)
+    return build_pattern(n, full, point, position.reshape(n, 3))
 
 
 def analyse(pattern: Pattern) -> Analysis:
@@ -41,11 +46,15 @@ def filled(pattern: Pattern, order: Ints) -> NDArray[np.bool_]:
     return np.asarray(np.triu(table))
 
 
+def pivots(front: Front) -> Ints:
+    return np.arange(front.first, front.first + front.pivots)
+
+
 def held(analysis: Analysis) -> NDArray[np.bool_]:
-    """Where the panels of the fronts have room."""
+    """Where the fronts have room."""
     table = np.zeros(2 * (len(analysis.order),), dtype=bool)
     for front in analysis.fronts:
-        table[np.ix_(front.rows[: front.pivots], front.rows)] = True
+        table[np.ix_(pivots(front), np.append(pivots(front), front.border))] = True
     return np.asarray(np.triu(table))
 
 
@@ -67,20 +76,23 @@ def test_fronts_fit_together(pattern: Pattern, cost: float) -> None:
         analysis = analyse(pattern)
     n = pattern.n_dofs
     assert np.array_equal(np.sort(analysis.order), np.arange(n))
-    assert np.array_equal(np.concatenate([front.rows[: front.pivots] for front in analysis.fronts]), np.arange(n))
+    assert np.array_equal(np.concatenate([pivots(front) for front in analysis.fronts]), np.arange(n))
     values, at = np.zeros(analysis.size), 0
     values[analysis.target] = np.arange(1, pattern.nnz + 1)
     table = np.zeros((n, n))
     for k, front in enumerate(analysis.fronts):
-        border = front.rows[front.pivots :]
-        assert np.all(np.diff(front.rows) > 0)
+        own, border = pivots(front), front.border
+        assert np.all(np.diff(np.append(own, border)) > 0)
         assert front.start == at
-        at += front.pivots * len(front.rows)
-        table[np.ix_(front.rows[: front.pivots], front.rows)] = values[front.start : at].reshape(front.pivots, -1)
+        for columns in (own, border):
+            size = len(own) * len(columns)
+            table[np.ix_(own, columns)] = values[at : at + size].reshape(len(own), -1)
+            at += size
         if len(border):
             assert front.above > k
-            assert np.array_equal(analysis.fronts[front.above].rows[front.places], border)
-            assert front.places[0] < analysis.fronts[front.above].pivots
+            above = analysis.fronts[front.above]
+            assert np.array_equal(np.append(pivots(above), above.border)[front.places], border)
+            assert front.places[0] < above.pivots
         else:
             assert front.above == -1
     assert at == analysis.size
@@ -126,3 +138,21 @@ def test_the_order_spares_fill(monkeypatch: pytest.MonkeyPatch) -> None:
     fill = held(analyse(pattern)).sum()
     assert fill < 0.7 * filled(pattern, np.arange(pattern.n_dofs)).sum()
     assert fill < 0.6 * held(analyse(whole)).sum()
+
+
+def test_dissection_saves_operations_in_a_weave(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eighty fibrils in which nodes up to two diameters apart touch: half of what minimum degree needs, at most."""
+    mesh = build_mesh(plain_weave())
+    fibril = np.repeat(np.arange(mesh.n_fibrils), np.diff(mesh.first_node))
+    touching = cKDTree(mesh.position).query_pairs(0.6, output_type="ndarray")
+    touching = touching[fibril[touching[:, 0]] != fibril[touching[:, 1]]]
+    full = np.concatenate([mesh.elements[:, [0, 1]], mesh.elements[:, [1, 2]], mesh.elements[:, [0, 2]]])
+    pattern = build_pattern(len(mesh.position), full, touching, mesh.position)
+
+    def operations() -> float:
+        sizes = np.array([(front.pivots, len(front.border)) for front in analyse(pattern).fronts], dtype=float)
+        return float((sizes.sum(axis=1) ** 3 - sizes[:, 1] ** 3).sum())
+
+    dissected = operations()
+    monkeypatch.setattr(fronts, "dissect", lambda graph, *_: minimum_degree(graph))
+    assert dissected < 0.5 * operations()

@@ -14,7 +14,7 @@ import circuittex.mech.fronts as fronts
 import circuittex.mech.multifrontal as multifrontal
 from circuittex.geometry.mesh import Floats, Ints
 from circuittex.mech.coupled import pair_of_entry
-from circuittex.mech.multifrontal import BLOCK, MultifrontalSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import Pattern, build_pattern, diagonal
 
 costs = st.sampled_from([0.0, 300.0, 3e4, fronts.FRONT])
@@ -28,7 +28,8 @@ def grid(side: int) -> Pattern:
     node = np.arange(side * side).reshape(side, side)
     along = np.stack([node[:, :-1].ravel(), node[:, 1:].ravel()], axis=1)
     across = np.stack([node[:-1].ravel(), node[1:].ravel()], axis=1)
-    return build_pattern(side * side, along, across)
+    place = np.stack([node.ravel() // side, node.ravel() % side, 0 * node.ravel()], axis=1)
+    return build_pattern(side * side, along, across, place.astype(float))
 
 
 def random_values(pattern: Pattern, seed: int, least: float) -> Floats:
@@ -127,17 +128,17 @@ def test_fronts_follow_the_coupled_pairs_and_are_kept_while_they_hold_them(monke
     assert analysed == [30 + 10, 30 + 30]  # thirty pairs along the fibrils
 
 
-def test_a_front_of_many_blocks() -> None:
-    """Everything in one front of more than three blocks, against NumPy's Cholesky of the same matrix."""
+def test_one_front_is_the_dense_factor() -> None:
+    """Everything in one front, against NumPy's Cholesky of the same matrix."""
     pattern = build_pattern(24, np.argwhere(np.triu(np.ones((24, 24)), 1)), np.empty((0, 2), dtype=np.int64))
-    assert pattern.n_dofs > 3 * BLOCK
     data = random_values(pattern, 3, 0.5)
     solver = solver_for(pattern, np.inf)
     assert solver.factor(pattern, data) is not None
-    (panel,) = solver._panels
+    ((triangle, border),) = solver._blocks
     order = solver._analysis.order
     expected = np.linalg.cholesky(dense(pattern, data)[np.ix_(order, order)]).T
-    assert np.abs(np.triu(panel) - expected).max() < 1e-12 * np.abs(expected).max()
+    assert np.abs(np.triu(triangle) - expected).max() < 1e-12 * np.abs(expected).max()
+    assert border.size == 0
 
 
 def test_the_same_matrix_gives_the_same_bits() -> None:

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from circuittex.contact.curve import CurveTable, bezier
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import Floats, Ints
+from circuittex.mech.pattern import distinct
 
 CONTROL_MOTION = 4 / 3
 """A Bézier point moves at most this times as far as the nodes that define it (the sum of its weights' magnitudes)."""
@@ -64,9 +65,11 @@ def coupled_nodes(table: CurveTable, candidates: Candidates) -> Ints:
     count = stop - start
     row = np.repeat(np.arange(len(count)), count)
     other = start[row] + np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    mine = window[candidates.interval][row]
-    between = np.unique(np.stack([mine, other], axis=1), axis=0) if len(mine) else np.empty((0, 2), dtype=np.int64)
-    between = (between[:, None, :] + np.stack([np.arange(4), np.zeros(4, dtype=np.int64)], axis=1)).reshape(-1, 2)
+    n = int(window.max()) + 4
+    key = distinct(window[candidates.interval][row] * n + other)  # windows of one, nodes of the other
+    between = np.stack([(key // n)[:, None] + np.arange(4), np.repeat(key % n, 4).reshape(-1, 4)], axis=2).reshape(
+        -1, 2
+    )
     i, j = np.triu_indices(4, 1)
-    within = np.unique(window)[:, None, None] + np.stack([i, j], axis=1)
+    within = distinct(window)[:, None, None] + np.stack([i, j], axis=1)
     return np.concatenate([between, within.reshape(-1, 2)])

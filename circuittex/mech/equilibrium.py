@@ -86,7 +86,7 @@ class System:
         if self.pattern is None or any(changed):
             pairs = [term.pairs() for term in self.terms]
             full, point = (np.concatenate([p[k] for p in pairs]) for k in (0, 1))
-            self.pattern = build_pattern(self.n // 9, full, point)
+            self.pattern = build_pattern(self.n // 9, full, point, q.reshape(-1, 9)[:, :3].copy())
             self.mass = self.mass_of(self.pattern)
             rows = np.repeat(np.arange(self.n), np.diff(self.pattern.indptr))
             is_fixed = np.zeros(self.n, dtype=bool)

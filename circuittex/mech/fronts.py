@@ -11,13 +11,16 @@ the position of node a, part 2 a + 1 its directors.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.linalg import splu
 
+from circuittex.compiled import compiled
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import Ints
+from circuittex.mech.dissection import dissect
 from circuittex.mech.pattern import Pattern
 from circuittex.mech.space import DOFS
 
@@ -30,18 +33,20 @@ tenth of it makes the factor an eighth smaller and the factorisation a tenth slo
 
 @frozen
 class Front:
-    """The place of a front in the factor and in the front above."""
+    """The place of a front in the factor and in the front above; unknowns are numbered in the order of elimination."""
 
-    rows: Ints
-    """(m,) its unknowns, numbered in the order of elimination and sorted: first the pivots, then the border."""
+    first: int
+    """its first pivot; the others follow."""
     pivots: int
     """p."""
+    border: Ints
+    """(b,) the unknowns of its border, rising."""
     start: int
-    """where in the factor its (p, m) values begin, those of one pivot after another's."""
+    """where in the factor its values begin: (p, p) of the pivots, then (p, b) of the border, row after row."""
     above: int
     """number of the front above; -1 where there is no border."""
     places: Ints
-    """(m - p,) where in the rows of the front above those of the border are."""
+    """(b,) where those of the border are in the front above, its pivots first."""
 
 
 @frozen
@@ -65,41 +70,69 @@ def analyse(pattern: Pattern, pair: Ints, coupled: NDArray[np.bool_]) -> Analysi
 
     `pair` (nnz,) is what `circuittex.mech.coupled.pair_of_entry` gives, `coupled` tells of each pair whether it counts.
     """
-    graph = _graph(pattern, coupled)
-    order = _minimum_degree(graph)
-    offset = np.arange(DOFS)
-    first = DOFS * (order // 2) + POSITION * (order % 2)
-    width = np.where(order % 2, DOFS - POSITION, POSITION)
-    members = _merge(_borders(graph, order), width.tolist())
+    n, graph = pattern.n_dofs, _graph(pattern, coupled)
+    width = np.tile([POSITION, DOFS - POSITION], graph.shape[0] // 2)
+    parts = dissect(graph, width, pattern.position.repeat(2, axis=0))
+    begin, later = _borders(graph, parts)
+    tops, front_of_turn = _merge(begin, later, width[parts])
 
-    def unknowns(parts: list[int]) -> Ints:
-        inside = offset < width[parts, None]
-        return (first[parts, None] + offset)[inside]
+    # Parts by their fronts, then their unknowns: the order of elimination.
+    by_front = np.argsort(front_of_turn, kind="stable")
+    parts, turn = parts[by_front], np.argsort(by_front)
+    width = width[parts]
+    order = _ranges(DOFS * (parts // 2) + POSITION * (parts % 2), width)
+    place, front_of = np.argsort(order), np.repeat(front_of_turn[by_front], width)
+    p = np.bincount(front_of)
+    first = np.cumsum(p) - p
 
-    eliminated = [unknowns(pivots) for pivots, _ in members]
-    order = np.concatenate(eliminated)
-    place = np.argsort(order)
-    rows = [np.sort(place[unknowns(pivots + border)]) for pivots, border in members]
-    p, m = (np.array([len(part) for part in parts]) for parts in (eliminated, rows))
-    front_of, start = np.repeat(np.arange(len(p)), p), np.cumsum(p * m) - p * m
-    above = [int(front_of[r[q]]) if len(r) > q else -1 for r, q in zip(rows, p, strict=True)]
+    # Borders, one after another in the order of the fronts.
+    owner = np.repeat(np.arange(len(tops)), begin[tops + 1] - begin[tops])
+    bordering = turn[later[_ranges(begin[tops], begin[tops + 1] - begin[tops])]]
+    sort = np.lexsort((bordering, owner))
+    owner, bordering = owner[sort], bordering[sort]
+    border = _ranges((np.cumsum(width) - width)[bordering], width[bordering])
+    owner = np.repeat(owner, width[bordering])
+    b = np.bincount(owner, minlength=len(p))
+    cut = np.cumsum(b) - b
+    labelled = owner * n + border
+
+    def local(front: Ints, unknown: Ints) -> Ints:
+        """Where unknowns are in fronts: among the pivots, or in the border behind them."""
+        behind = p[front] + np.searchsorted(labelled, front * n + unknown) - cut[front]
+        return np.where(front_of[unknown] == front, unknown - first[front], behind)
+
+    above = np.full(len(p), -1)
+    above[b > 0] = front_of[border[cut[b > 0]]]
+    places = local(above[owner], border)
+    size = p * (p + b)
+    start = np.cumsum(size) - size
     fronts = tuple(
-        Front(rows=r, pivots=int(q), start=int(at), above=up, places=np.searchsorted(rows[up], r[q:]))
-        for r, q, at, up in zip(rows, p, start, above, strict=True)
+        Front(
+            first=int(first[k]),
+            pivots=int(p[k]),
+            border=border[cut[k] : cut[k] + b[k]],
+            start=int(start[k]),
+            above=int(above[k]),
+            places=places[cut[k] : cut[k] + b[k]],
+        )
+        for k in range(len(p))
     )
 
     entries = np.flatnonzero(np.append(coupled, True)[pair])  # pair -1 takes the last: True
-    owner = np.repeat(np.arange(pattern.n_dofs), np.diff(pattern.indptr))
-    i, j = place[owner[entries]], place[pattern.indices[entries]]
-    row, column = np.maximum(i, j), np.minimum(i, j)
-    front = front_of[column]
-    labelled = np.concatenate([k * pattern.n_dofs + r for k, r in enumerate(rows)])  # rising, so one search finds all
-    local = np.searchsorted(labelled, front * pattern.n_dofs + row) - (np.cumsum(m) - m)[front]
-    target = start[front] + (column - (np.cumsum(p) - p)[front]) * m[front] + local
-    return Analysis(order=order, fronts=fronts, entries=entries, target=target, size=int((p * m).sum()))
+    i = place[np.repeat(np.arange(n), np.diff(pattern.indptr))[entries]]
+    j = place[pattern.indices[entries]]
+    front, row = front_of[np.minimum(i, j)], np.minimum(i, j)
+    row, column, triangle = row - first[front], local(front, np.maximum(i, j)), p[front]
+    inside = np.where(column < triangle, row * triangle + column, triangle**2 + row * b[front] + column - triangle)
+    return Analysis(order=order, fronts=fronts, entries=entries, target=start[front] + inside, size=int(size.sum()))
 
 
-def _graph(pattern: Pattern, coupled: NDArray[np.bool_]) -> sp.csc_array:
+def _ranges(first: Ints, length: Ints) -> Ints:
+    """first, first + 1, ... of each range, one range after another."""
+    return np.repeat(first - np.cumsum(length) + length, length) + np.arange(length.sum())
+
+
+def _graph(pattern: Pattern, coupled: NDArray[np.bool_]) -> sp.csr_array:
     """Ones where two different parts are coupled."""
     n = pattern.n_dofs // DOFS
     node = np.arange(n)
@@ -109,61 +142,89 @@ def _graph(pattern: Pattern, coupled: NDArray[np.bool_]) -> sp.csc_array:
     i = np.concatenate([2 * node, 2 * a, 2 * c, 2 * c + 1, 2 * c + 1])
     j = np.concatenate([2 * node + 1, 2 * b, 2 * d + 1, 2 * d, 2 * d + 1])
     ends = np.concatenate([i, j]), np.concatenate([j, i])
-    return sp.csc_array((np.ones(2 * len(i)), ends), shape=(2 * n, 2 * n))
+    return sp.csr_array((np.ones(2 * len(i)), ends), shape=(2 * n, 2 * n))
 
 
-def _minimum_degree(graph: sp.csc_array) -> Ints:
-    """The parts in SuperLU's order of minimum degree, which SciPy gives away with a factorisation only."""
-    laplacian = sp.diags_array(graph.sum(axis=0) + 1.0) - graph
-    options = {"SymmetricMode": True, "Equil": False}
-    lu = splu(laplacian.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-    return np.argsort(lu.perm_c)
+def _borders(graph: sp.csr_array, order: Ints) -> tuple[Ints, Ints]:
+    """For each part the later ones to which it is coupled when its turn comes; parts are numbered by their turns.
+
+    Returns where those of each part begin, and all of them.
+    """
+    turned = graph[order][:, order]
+    begin = np.zeros(len(order) + 1, dtype=np.int64)
+    later = _eliminate(turned.indptr.astype(np.int64), turned.indices.astype(np.int64), begin)
+    return begin, later
 
 
-def _borders(graph: sp.csc_array, order: Ints) -> list[set[int]]:
-    """For each part the later ones to which it is coupled when its turn comes; parts are numbered by their turns."""
-    turn = np.argsort(order)
-    of, neighbour = turn[np.repeat(np.arange(len(order)), np.diff(graph.indptr))], turn[graph.indices]
-    later = neighbour > of
-    of, neighbour = of[later], neighbour[later]
-    by_turn = np.argsort(of, kind="stable")
-    cuts = np.searchsorted(of[by_turn], np.arange(1, len(order)))
-    borders = [set(part.tolist()) for part in np.split(neighbour[by_turn], cuts)]
-    for border in borders:
-        if border:
-            above = min(border)
-            borders[above] |= border - {above}
-    return borders
+@compiled
+def _eliminate(indptr: Any, indices: Any, begin: Any) -> Any:
+    """Eliminate part after part: what is coupled to one comes to be coupled to the next of these."""
+    n = len(indptr) - 1
+    later, seen = np.empty(4 * len(indices), np.int64), np.full(n, -1)
+    below, sibling = np.full(n, -1), np.full(n, -1)  # the parts whose next one is this: a linked list
+    end = 0
+    for k in range(n):
+        if end + n > len(later):
+            longer = np.empty(2 * (end + n), np.int64)
+            longer[:end] = later[:end]
+            later = longer
+        seen[k], nearest = k, n
+        for at in range(indptr[k], indptr[k + 1]):
+            j = indices[at]
+            if j > k and seen[j] != k:
+                seen[j], later[end], nearest, end = k, j, min(nearest, j), end + 1
+        child = below[k]
+        while child >= 0:
+            for at in range(begin[child], begin[child + 1]):
+                j = later[at]
+                if seen[j] != k:
+                    seen[j], later[end], nearest, end = k, j, min(nearest, j), end + 1
+            child = sibling[child]
+        begin[k + 1] = end
+        if nearest < n:
+            sibling[k], below[nearest] = below[nearest], k
+    return later[:end]
 
 
-def _merge(borders: list[set[int]], width: list[int]) -> list[tuple[list[int], list[int]]]:
-    """Pivots and borders of the fronts, in parts.
+def _merge(begin: Ints, later: Ints, width: Ints) -> tuple[Ints, Ints]:
+    """The part that gives each front its border, and the front of each part.
 
     At first every part is a front. Each takes in those below it while that saves time, the largest first, and those
     below a front come just before it, which keeps few of them waiting.
     """
-    pivots = [[part] for part in range(len(borders))]
-    below: list[list[int]] = [[] for _ in borders]
-    p, b = width.copy(), [sum(map(width.__getitem__, border)) for border in borders]
-    for k, border in enumerate(borders):
+    n = len(width)
+    some = np.diff(begin) > 0
+    above = np.full(n, -1)
+    above[some] = np.minimum.reduceat(later, begin[:-1][some])
+    total = np.concatenate([[0], np.cumsum(width[later])])
+    p, b = width.tolist(), np.diff(total[begin]).tolist()
+    below: list[list[int]] = [[] for _ in range(n)]
+    taken = list(range(n))
+    for k, up in enumerate(above.tolist()):
         kept = []
         for c in sorted(below[k], key=lambda c: -b[c]):
             if _work(p[k] + p[c], b[k]) < _work(p[k], b[k]) + _work(p[c], b[c]) + FRONT:
                 p[k] += p[c]
-                pivots[k] += pivots[c]
+                taken[c] = k
                 kept += below[c]
             else:
                 kept.append(c)
         below[k] = kept
-        if border:
-            below[min(border)].append(k)
+        if up >= 0:
+            below[up].append(k)
     backwards: list[int] = []
-    waiting = [k for k, border in enumerate(borders) if not border]
+    waiting = np.flatnonzero(~some).tolist()
+    waiting = [k for k in waiting if taken[k] == k]
     while waiting:
         k = waiting.pop()
         backwards.append(k)
         waiting += below[k]
-    return [(pivots[k], list(borders[k])) for k in reversed(backwards)]
+    tops = np.array(backwards[::-1])
+    front = np.empty(n, dtype=np.int64)
+    front[tops] = np.arange(len(tops))
+    for c in range(n - 1, -1, -1):  # what takes a part in comes after it
+        front[c] = front[taken[c]]
+    return tops, front
 
 
 def _work(p: int, b: int) -> float:

@@ -22,16 +22,14 @@ from circuittex.fields import solve_probes
 from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
 from circuittex.increment import advance
 from circuittex.mech.configuration import Configuration
-from circuittex.mech.linear import CholmodSolver, LinearSolver, PardisoSolver, best_solver
+from circuittex.mech.linear import LinearSolver, PardisoSolver, best_solver
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.plan import Step, plan
 from circuittex.relaxation import Equilibrium, clamp_force, relax
 from circuittex.results import Study
 from circuittex.store import load_study
 
-SOLVERS: dict[str, Callable[[], LinearSolver]] = {
-    solver.name: solver for solver in (PardisoSolver, CholmodSolver, MultifrontalSolver)
-}
+SOLVERS: dict[str, Callable[[], LinearSolver]] = {solver.name: solver for solver in (PardisoSolver, MultifrontalSolver)}
 HEAD = ["state", "iterations", "recorded", "clamp force", "probe current"]
 
 

@@ -29,7 +29,7 @@ from circuittex.geometry.mesh import Floats
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
-from circuittex.mech.linear import CholmodSolver, LinearSolver, PardisoSolver, Solve
+from circuittex.mech.linear import LinearSolver, PardisoSolver, Solve
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import Pattern
 from circuittex.mech.space import BeamSpace
@@ -81,8 +81,8 @@ class SuperLU:
 
 def installed() -> list[Callable[[], LinearSolver]]:
     """The solvers that can be had here, the fastest first, and SciPy's own as the peer of all."""
-    extras: list[tuple[Callable[[], LinearSolver], str]] = [(PardisoSolver, "pypardiso"), (CholmodSolver, "cvxopt")]
-    return [*(solver for solver, package in extras if importlib.util.find_spec(package)), MultifrontalSolver, SuperLU]
+    extras = [PardisoSolver] if importlib.util.find_spec("pypardiso") else []
+    return [*extras, MultifrontalSolver, SuperLU]
 
 
 def part_rows(watch: Stopwatch) -> list[list[object]]:

@@ -88,7 +88,7 @@ LIBRARIES: dict[str, set[str]] = {
     "skfem": {"mech", "fields"},
     "numba": {"compiled"},
     "pypardiso": {"mech"},
-    "cvxopt": {"mech"},
+    "threadpoolctl": {"mech"},
     "networkx": {"circuit"},
     "PySpice": {"pyspice_export"},
     "h5py": {"store"},

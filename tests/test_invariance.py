@@ -24,10 +24,7 @@ from circuittex.relaxation import Equilibrium, clamp_force, move, relax
 
 
 def usable() -> dict[str, type]:
-    """Every solver that can be loaded here, by its class's name.
-
-    PARDISO comes last: where its BLAS is in the process already, CHOLMOD calls that instead of its own.
-    """
+    """Every solver that can be loaded here, by its class's name."""
     found = {}
     for name, kind in vars(linear).items():
         if name.endswith("Solver") and kind is not LinearSolver:
@@ -36,7 +33,7 @@ def usable() -> dict[str, type]:
             except (ImportError, OSError):
                 continue
             found[name] = kind
-    return dict(sorted(found.items(), key=lambda item: item[1].name == "pardiso"))
+    return found
 
 
 SOLVERS = usable()

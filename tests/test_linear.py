@@ -12,7 +12,7 @@ from beams import dense
 
 from circuittex.geometry.mesh import Floats
 from circuittex.mech.coupled import Coupled, pair_of_entry
-from circuittex.mech.linear import CholmodSolver, LinearSolver, PardisoSolver, best_solver
+from circuittex.mech.linear import LinearSolver, PardisoSolver, best_solver
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import Pattern, build_pattern, diagonal
 
@@ -25,7 +25,6 @@ def has(module: str) -> bool:
 SOLVERS: list[Callable[[], LinearSolver]] = [
     MultifrontalSolver,
     *([PardisoSolver] if has("pypardiso") else []),
-    *([CholmodSolver] if has("cvxopt") else []),
 ]
 NODES = 12
 
@@ -138,12 +137,9 @@ def test_singular_matrix_is_none(make: Callable[[], LinearSolver]) -> None:
 
 
 def test_best_solver_is_the_first_that_can_be_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A wheel that is missing, or whose own libraries are, is passed over; the last needs none."""
-    installed = [name for name, module in (("pardiso", "pypardiso"), ("cholmod", "cvxopt")) if has(module)]
-    expected = [*installed, "multifrontal"]
-    assert best_solver().name == expected[0]
-    for module in ("pypardiso", "cvxopt"):
-        monkeypatch.setitem(sys.modules, module, None)  # makes its import raise ImportError
+    """A wheel that is missing, or whose own libraries are, is passed over."""
+    assert best_solver().name == ("pardiso" if has("pypardiso") else "multifrontal")
+    monkeypatch.setitem(sys.modules, "pypardiso", None)  # makes its import raise ImportError
     assert best_solver().name == "multifrontal"
 
 

@@ -34,49 +34,11 @@ class LinearSolver(Protocol):
 
 
 def best_solver() -> LinearSolver:
-    """The fastest installed: PARDISO, then CHOLMOD (both of the `fast` extra), then the one that needs neither."""
-    for solver in (PardisoSolver, CholmodSolver):
-        try:
-            return solver()
-        except (ImportError, OSError):  # not installed, or a library of its own is missing
-            continue
-    return MultifrontalSolver()
-
-
-class CholmodSolver:
-    """CHOLMOD's supernodal Cholesky as cvxopt brings it; its analysis is kept while the same pairs are coupled."""
-
-    name = "cholmod"
-
-    def __init__(self) -> None:
-        from cvxopt import cholmod, matrix, spmatrix
-
-        self._cholmod, self._dense, self._sparse = cholmod, matrix, spmatrix
-        self._coupled = Coupled()
-        self._matrix: Any = None
-        self._factor: Any = None
-
-    def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
-        """A function that solves with the matrix (until the next call), or None if it is not positive definite."""
-        if self._coupled.renew(pattern, data):  # the upper triangle by rows is the lower triangle by columns
-            entries = self._coupled.entries
-            columns = np.repeat(np.arange(pattern.n_dofs), np.diff(self._coupled.start()))
-            shape = (pattern.n_dofs, pattern.n_dofs)
-            triplets = (self._dense(part) for part in (data[entries], pattern.indices[entries], columns))
-            self._matrix = self._sparse(*triplets, shape)
-            self._factor = self._cholmod.symbolic(self._matrix)
-        self._matrix.V = self._dense(data[self._coupled.entries])
-        try:
-            self._cholmod.numeric(self._matrix, self._factor)
-        except ArithmeticError:  # cvxopt's word for a pivot that is not positive
-            return None
-
-        def solve(b: Floats) -> Floats:
-            x = self._dense(b)
-            self._cholmod.solve(self._factor, x)
-            return np.array(x).ravel()
-
-        return solve
+    """The fastest installed: PARDISO, of the `fast` extra, or else the one that needs no extra."""
+    try:
+        return PardisoSolver()
+    except (ImportError, OSError):  # not installed, or a library of its own is missing
+        return MultifrontalSolver()
 
 
 class PardisoSolver:

@@ -62,8 +62,10 @@ class PenaltyContact:
         self.points = contact_points(mesh, per_element)
         size = mesh.length / np.diff(mesh.first_element) / per_element
         self.weight = size / 2  # half: the pair is integrated from both sides
-        self._candidates: Candidates | None = None
-        self._built_at = np.empty((0, 3))
+        self._held: tuple[Candidates, Floats] | None = None
+        """What the pattern has room for, and the nodes (N, 3) for which it was searched."""
+        self._tried: tuple[Candidates, Floats] | None = None
+        """The same for a trial outside the reach of what is held."""
         self._last: tuple[Floats, Touching] | None = None
 
     def positions(self, q: Floats) -> Floats:
@@ -72,33 +74,31 @@ class PenaltyContact:
 
     def prepare(self, q: Floats) -> bool:
         """Renew the candidates once a Bézier point may have moved by half the skin."""
-        r = self.positions(q)
-        if self._candidates is not None and self._valid(r):
-            return False
-        self._candidates = find_candidates(self.table, r, self.mesh.radius, self.skin)
-        self._built_at = r
-        self._last = None
-        return True
+        held = self._near(self.positions(q))
+        renewed, self._held = held is not self._held, held
+        return renewed
 
-    def _valid(self, r: Floats) -> bool:
-        """Whether the candidates still hold every pair in touch: no Bézier point has moved by half the skin."""
-        moved = float(((r - self._built_at) ** 2).sum(axis=1).max()) ** 0.5
-        return bool(CONTROL_MOTION * moved <= self.skin / 2)
+    def _near(self, r: Floats) -> tuple[Candidates, Floats]:
+        """Candidates that hold every pair in touch at r: since their search no Bézier point moved by half the skin."""
+        for known in (self._held, self._tried):
+            if known is not None:
+                moved = float(((r - known[1]) ** 2).sum(axis=1).max()) ** 0.5
+                if CONTROL_MOTION * moved <= self.skin / 2:
+                    return known
+        self._tried = find_candidates(self.table, r, self.mesh.radius, self.skin), r
+        return self._tried
 
     def pairs(self) -> tuple[Ints, Ints]:
         """Node pairs that the present candidates can couple, positions only."""
-        assert self._candidates is not None, "prepare comes first"
-        return np.empty((0, 2), dtype=np.int64), self.slot[coupled_nodes(self.table, self._candidates)]
+        assert self._held is not None, "prepare comes first"
+        return np.empty((0, 2), dtype=np.int64), self.slot[coupled_nodes(self.table, self._held[0])]
 
     def touching(self, q: Floats) -> Touching:
-        """All contact points that overlap at q; candidates are renewed for it if q lies outside their reach."""
+        """All contact points that overlap at q; candidates are searched for it if q lies outside their reach."""
         if self._last is not None and np.array_equal(self._last[0], q):
             return self._last[1]
         r = self.positions(q)
-        candidates = self._candidates
-        if candidates is None or not self._valid(r):
-            candidates = find_candidates(self.table, r, self.mesh.radius, 0.0)
-        found = _search(self.mesh, self.table, self.points, candidates, r)
+        found = _search(self.mesh, self.table, self.points, self._near(r)[0], r)
         self._last = q.copy(), found
         return found
 

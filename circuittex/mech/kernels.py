@@ -32,13 +32,13 @@ def strains(slots: Any, x: Any, shape: Any, slope: Any, u: Any, normal: Any) -> 
     """Fill u (5, 3) with (g1, g2, r', g1', g2') from the nodal values x (slots, 9), and normal (3,) with g1 x g2."""
     u[:] = 0.0
     for a in range(slots.shape[0]):
-        row = x[slots[a]]
+        slot = slots[a]
         for c in range(3):
-            u[0, c] += shape[a] * row[3 + c]
-            u[1, c] += shape[a] * row[6 + c]
-            u[2, c] += slope[a] * row[c]
-            u[3, c] += slope[a] * row[3 + c]
-            u[4, c] += slope[a] * row[6 + c]
+            u[0, c] += shape[a] * x[slot, 3 + c]
+            u[1, c] += shape[a] * x[slot, 6 + c]
+            u[2, c] += slope[a] * x[slot, c]
+            u[3, c] += slope[a] * x[slot, 3 + c]
+            u[4, c] += slope[a] * x[slot, 6 + c]
     for c in range(3):
         c1, c2 = (c + 1) % 3, (c + 2) % 3
         normal[c] = u[0, c1] * u[1, c2] - u[0, c2] * u[1, c1]
@@ -116,16 +116,35 @@ def _stretch_curved(d: Any, points: Any, metric: Any, half_trace: Any, squared: 
 
 
 @compiled
-def section(u: Any, normal: Any, natural: Any, metric: Any, points: Any, j: Any, work: Any) -> bool:
+def _volumes(j: Any, points: Any, squared: Any, volume: Any) -> tuple[int, int]:
+    """Replace volume (S,), that of the natural shape squared, by the present one; fill squared (S,) with J^2.
+
+    Returns how many points are not inside out, and at how many the series of the logarithm does not serve. Counted,
+    not branched at, so that several points are computed at once.
+    """
+    right, far = 0, 0
+    j0, j1, j2, first, second = j[0], j[1], j[2], points[0], points[1]
+    for s in range(volume.shape[0]):
+        J = j0 + first[s] * j1 + second[s] * j2
+        ratio2 = J * J / volume[s]
+        right += J > 0.0
+        far += (ratio2 <= LEAST) | (ratio2 >= LARGEST)
+        squared[s], volume[s] = ratio2, J
+    return right, far
+
+
+@compiled
+def section(u: Any, normal: Any, natural: Any, metric: Any, points: Any, d: Any, j: Any, work: Any) -> bool:
     """State of all section points of one line point; False where one is inside out.
 
-    Fills j (3,) and the rows of work (4, S): tr c / 2, J^2 - 1, ln J, and the volume before the natural shape is
-    divided out. natural (5, 5); metric (S, 3, 3), or (0, 3, 3) for a straight natural shape; points (2, S).
+    Fills d (5, 5) with the products of strains less the natural ones, j (3,), and the rows of work (4, S): tr c / 2,
+    J^2, ln J, and the volume before the natural shape is divided out. natural (5, 5); metric (S, 3, 3), or (0, 3, 3)
+    for a straight natural shape; points (2, S).
     """
-    d = np.empty((N_STRAINS, N_STRAINS))
     for m in range(N_STRAINS):
-        for n in range(N_STRAINS):
-            d[m, n] = u[m, 0] * u[n, 0] + u[m, 1] * u[n, 1] + u[m, 2] * u[n, 2] - natural[m, n]
+        u0, u1, u2 = u[m, 0], u[m, 1], u[m, 2]
+        for n in range(m, N_STRAINS):
+            d[m, n] = d[n, m] = u0 * u[n, 0] + u1 * u[n, 1] + u2 * u[n, 2] - natural[m, n]
     for i in range(3):
         j[i] = u[2 + i, 0] * normal[0] + u[2 + i, 1] * normal[1] + u[2 + i, 2] * normal[2]
     if metric.shape[0] > 0:
@@ -134,14 +153,13 @@ def section(u: Any, normal: Any, natural: Any, metric: Any, points: Any, j: Any,
         _stretch_straight(d, points, work[0], work[1])
         work[3] = 1.0
     _logarithms(work[1], work[2])
-    for s in range(points.shape[1]):
-        J = j[0] + points[0, s] * j[1] + points[1, s] * j[2]
-        if not J > 0.0:
-            return False
-        ratio2 = J * J / work[3, s]
-        if not LEAST < ratio2 < LARGEST:
-            work[2, s] = 0.5 * np.log(ratio2)
-        work[3, s] = J
+    right, far = _volumes(j, points, work[1], work[3])
+    if right < points.shape[1]:
+        return False
+    if far > 0:
+        for s in range(points.shape[1]):
+            if not LEAST < work[1, s] < LARGEST:
+                work[2, s] = 0.5 * np.log(work[1, s])
     return True
 
 
@@ -157,13 +175,18 @@ def energy(weight: Any, mu: Any, lam: Any, work: Any) -> float:
 
 @compiled
 def moments(weight: Any, points: Any, mu: Any, lam: Any, work: Any, p: Any, A: Any) -> None:
-    """Fill p (3,) and A (3, 3) with the section's moments of f' and f''."""
+    """Fill p (3,) and A (3, 3) with the section's moments of f' and f''; overwrites work's first two rows with these.
+
+    The sums keep their order, so only what comes before them is computed for several points at once.
+    """
     p0 = p1 = p2 = a00 = a01 = a02 = a11 = a12 = a22 = 0.0
+    slopes, curvatures, log, volume = work[0], work[1], work[2], work[3]
     for s in range(weight.shape[0]):
-        x, y, inverse = points[0, s], points[1, s], 1.0 / work[3, s]
-        slope = lam[s] * work[2, s] - mu[s]
-        first = weight[s] * slope * inverse
-        second = weight[s] * (lam[s] - slope) * inverse * inverse
+        inverse, slope = 1.0 / volume[s], lam[s] * log[s] - mu[s]
+        slopes[s] = weight[s] * slope * inverse
+        curvatures[s] = weight[s] * (lam[s] - slope) * inverse * inverse
+    for s in range(weight.shape[0]):
+        x, y, first, second = points[0, s], points[1, s], slopes[s], curvatures[s]
         p0 += first
         p1 += first * x
         p2 += first * y
@@ -202,12 +225,13 @@ def beam_energy(
     (1 or M, Q, 5, 5); metric (1, Q, 0, 3, 3) or (M, Q, S, 3, 3); mu, lam (M, S).
     """
     u, normal, j, work = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, weight.shape[2]))
+    d = np.empty((N_STRAINS, N_STRAINS))
     for e in range(first, last):
         block, shaped = min(e, points.shape[0] - 1), min(e, natural.shape[0] - 1)
         out[e] = 0.0
         for q in range(shape.shape[1]):
             strains(slots[e], x, shape[e, q], slope[e, q], u, normal)
-            if section(u, normal, natural[shaped, q], metric[shaped, q], points[block], j, work):
+            if section(u, normal, natural[shaped, q], metric[shaped, q], points[block], d, j, work):
                 out[e] += energy(weight[e, q], mu[e], lam[e], work)
             else:
                 out[e] = np.inf
@@ -235,12 +259,12 @@ def section_force(
     quadratic (M, Q, 5, 5): the part of it that is linear in u.
     """
     u, normal, j, work = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, area.shape[2]))
-    p, A = np.empty(3), np.empty((3, 3))
+    d, p, A = np.empty((N_STRAINS, N_STRAINS)), np.empty(3), np.empty((3, 3))
     for e in range(first, last):
         block, shaped = min(e, points.shape[0] - 1), min(e, natural.shape[0] - 1)
         for q in range(shape.shape[1]):
             strains(slots[e], x, shape[e, q], slope[e, q], u, normal)
-            section(u, normal, natural[shaped, q], metric[shaped, q], points[block], j, work)
+            section(u, normal, natural[shaped, q], metric[shaped, q], points[block], d, j, work)
             moments(area[e, q], points[block], mu[e], lam[e], work, p, A)
             for c in range(3):
                 force[e, q, c] = p[0] * normal[c]

@@ -161,7 +161,7 @@ def add_tangent(
     Arguments as `beam_energy`, the slots of an element in ascending order; stiffness (M, 3 n, 3 n).
     """
     u, normal, j, work = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, weight.shape[2]))
-    p, A = np.empty(3), np.empty((3, 3))
+    d, p, A = np.empty((N_STRAINS, N_STRAINS)), np.empty(3), np.empty((3, 3))
     V, W = np.zeros((RANK, WIDTH)), np.zeros((RANK, WIDTH))
     vectors = stiffness.shape[1]
     C, K, g = np.empty((vectors, vectors, 3)), np.zeros((3 * vectors, WIDTH)), np.empty(WIDTH)
@@ -170,7 +170,7 @@ def add_tangent(
         out[e], g[:], C[:] = 0.0, 0.0, 0.0
         for q in range(shape.shape[1]):
             strains(slots[e], x, shape[e, q], slope[e, q], u, normal)
-            if not section(u, normal, natural[shaped, q], metric[shaped, q], points[block], j, work):
+            if not section(u, normal, natural[shaped, q], metric[shaped, q], points[block], d, j, work):
                 out[e] = np.inf
                 continue
             out[e] += energy(weight[e, q], mu[e], lam[e], work)

@@ -69,34 +69,81 @@ def build_circuit(contacts: ContactState, terminals: Sequence[Terminal], *, drop
 
     Raises `CircuitError` for terminals that share a yarn end or name none, and for values that are not finite.
     """
-    mesh = contacts.mesh
+    return build_circuits(contacts, [terminals], dropped_contacts=dropped_contacts)[0]
+
+
+def build_circuits(
+    contacts: ContactState, terminals: Sequence[Sequence[Terminal]], *, dropped_contacts: int = 0
+) -> list[Circuit]:
+    """Return `build_circuit` of one contact state for several choices of terminals."""
+    apart = _resistors_apart(contacts)
+    return [_joined(contacts, apart, choice, dropped_contacts) for choice in terminals]
+
+
+@frozen
+class _Apart:
+    """All fibril segments and live contacts between S sites, before terminals join any of these."""
+
+    live: Ints
+    """(L,) the contacts that can carry current."""
+    fibril: Ints
+    """(S,) fibril of each site."""
+    xi: Floats
+    """(S,) axis coordinate of each site, mm."""
+    end_site: Ints
+    """(F, 2) sites of the ends of each fibril, -1 for an insulating one."""
+    place_names: tuple[str, ...]
+    """(S,) word for each site; not all of them differ."""
+    site: Ints
+    """(R, 2) sites of each resistor: the segments, then the contacts."""
+    kind: Ints
+    """(R,) `SEGMENT` or `CONTACT`."""
+    resistance: Floats
+    """(R,) ohm."""
+    names: tuple[str, ...]
+    """(R,) name of each resistor."""
+
+
+def _resistors_apart(contacts: ContactState) -> _Apart:
     live = live_contacts(contacts)
-    site_fibril, site_xi, foot_site, end_site = sites(contacts, live)
-    port_of_site = _join(mesh, terminals, end_site, len(site_xi))
+    fibril, xi, foot_site, end_site = sites(contacts, live)
+    first = np.flatnonzero(fibril[1:] == fibril[:-1])
+    places = place_names(contacts.mesh, fibril, xi)
+    return _Apart(
+        live=live,
+        fibril=fibril,
+        xi=xi,
+        end_site=end_site,
+        place_names=tuple(places),
+        site=np.concatenate([np.stack([first, first + 1], axis=1), foot_site]),
+        kind=np.repeat([SEGMENT, CONTACT], [len(first), len(live)]),
+        resistance=np.concatenate([axial_resistance(contacts, fibril, xi)[first], 1.0 / contacts.conductance[live]]),
+        names=unique_names([f"s_{places[i]}" for i in first.tolist()] + _contact_names(contacts, live)),
+    )
+
+
+def _joined(contacts: ContactState, apart: _Apart, terminals: Sequence[Terminal], dropped_contacts: int) -> Circuit:
+    """Join the sites of each terminal, and keep what the terminals reach."""
+    port_of_site = _join(contacts.mesh, terminals, apart.end_site, len(apart.xi))
     free = port_of_site < 0
+    inner = np.flatnonzero(free)
     node = np.where(free, len(terminals) + np.cumsum(free) - 1, port_of_site)
-
-    first = np.flatnonzero(site_fibril[1:] == site_fibril[:-1])
-    pairs = np.concatenate([np.stack([node[first], node[first + 1]], axis=1), node[foot_site]])
-    kind = np.repeat([SEGMENT, CONTACT], [len(first), len(live)])
-    conductance = contacts.conductance[live]
-    resistance = np.concatenate([axial_resistance(contacts, site_fibril, site_xi)[first], 1.0 / conductance])
-    names = _resistor_names(contacts, live, site_fibril[first], site_xi[first])
-
+    pairs = node[apart.site]
     loop = pairs[:, 0] == pairs[:, 1]  # both ends in one terminal: no current
     keep = np.flatnonzero(~loop)
+    lost = contacts.n_contacts - len(apart.live) + int(np.sum(loop & (apart.kind == CONTACT)))
     whole = Circuit(
-        node_names=unique_names([t.name for t in terminals] + place_names(mesh, site_fibril[free], site_xi[free])),
-        node_fibril=np.concatenate([np.full(len(terminals), -1), site_fibril[free]]),
-        node_xi=np.concatenate([np.full(len(terminals), np.nan), site_xi[free]]),
+        node_names=unique_names([t.name for t in terminals] + [apart.place_names[i] for i in inner.tolist()]),
+        node_fibril=np.concatenate([np.full(len(terminals), -1), apart.fibril[inner]]),
+        node_xi=np.concatenate([np.full(len(terminals), np.nan), apart.xi[inner]]),
         resistor_nodes=pairs[keep],
-        resistance=resistance[keep],
-        resistor_names=tuple([names[i] for i in keep]),
-        resistor_kind=kind[keep],
+        resistance=apart.resistance[keep],
+        resistor_names=tuple([apart.names[i] for i in keep.tolist()]),
+        resistor_kind=apart.kind[keep],
         ports=tuple(t.name for t in terminals),
         port_node=np.arange(len(terminals)),
-        merged_feet=2 * len(live) + 2 * len(np.unique(site_fibril)) - len(site_xi),
-        dropped_contacts=dropped_contacts + contacts.n_contacts - len(live) + int(np.sum(loop & (kind == CONTACT))),
+        merged_feet=2 * len(apart.live) + 2 * len(np.unique(apart.fibril)) - len(apart.xi),
+        dropped_contacts=dropped_contacts + lost,
         unreached=np.empty(0, dtype=np.int64),
     )
     return reached_part(whole, whole.ports)
@@ -177,11 +224,10 @@ def _join(mesh: FibrilMesh, terminals: Sequence[Terminal], end_site: Ints, n_sit
     return port
 
 
-def _resistor_names(contacts: ContactState, live: Ints, fibril: Ints, xi: Floats) -> tuple[str, ...]:
-    """Name the segments that start at the given places, then the live contacts, after place and fibrils."""
+def _contact_names(contacts: ContactState, live: Ints) -> list[str]:
+    """Name the live contacts after their fibrils and their place on the first."""
     fibrils = fibril_names(contacts.mesh)
-    segments = [f"s_{place}" for place in place_names(contacts.mesh, fibril, xi)]
-    touching = [
+    return [
         f"c_{fibrils[a]}_{fibrils[b]}_{um}um"
         for a, b, um in zip(
             contacts.fibril_a[live].tolist(),
@@ -190,7 +236,6 @@ def _resistor_names(contacts: ContactState, live: Ints, fibril: Ints, xi: Floats
             strict=True,
         )
     ]
-    return unique_names(segments + touching)
 
 
 def reduced_circuit(shape: tuple[int, int], Ry: float, Rc: float) -> Circuit:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -98,18 +99,29 @@ def network_conductances(design: Design, Ry: float, Rc: float) -> Floats:
     A share is the power Σ G ΔV² of those resistors over the squared probe voltage. Since the power is stationary in
     the potential, -share / Ry and -share / Rc are also the exact derivatives of the conductance with Ry and Rc.
     """
-    shape = (len(design.weave.warp), len(design.weave.weft))
+    ends = {t.name: tuple(yarn_end_name(yarn, side) for yarn, side in t.ends) for t in design.terminals}
+    pairs = tuple((ends[probe.source], ends[probe.sink]) for probe in design.probes)
+    return _conductances((len(design.weave.warp), len(design.weave.weft)), pairs, Ry, Rc)
+
+
+# The start values of the fit are the same for every state, and a misfit and its derivatives follow from one solution.
+@lru_cache(maxsize=100)
+def _conductances(
+    shape: tuple[int, int], pairs: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...], Ry: float, Rc: float
+) -> Floats:
+    """`network_conductances` between the (source, sink) ends of each probe; nobody may write to what it returns."""
     whole = reduced_circuit(shape, Ry, Rc)
-    ends = {t.name: [yarn_end_name(yarn, side) for yarn, side in t.ends] for t in design.terminals}
     shares = []
-    for probe in design.probes:
-        drive = dict.fromkeys(ends[probe.source], 1.0) | dict.fromkeys(ends[probe.sink], 0.0)
+    for source, sink in pairs:
+        drive = dict.fromkeys(source, 1.0) | dict.fromkeys(sink, 0.0)
         part = reached_part(whole, drive)
         voltage = solve_nodal(part, drive).voltage
         power = np.diff(voltage[part.resistor_nodes], axis=1)[:, 0] ** 2 / part.resistance
         crossing = np.array([name.startswith("rc_") for name in part.resistor_names])
         shares.append((power[~crossing].sum(), power[crossing].sum()))
-    return np.array(shares, dtype=np.float64).reshape(-1, 2)
+    found = np.array(shares, dtype=np.float64).reshape(-1, 2)
+    found.setflags(write=False)
+    return found
 
 
 def _checked(currents: Sequence[float] | Floats, design: Design, volts: Floats) -> Floats:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array
+from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from circuittex.circuit import Circuit, islands, port_nodes
@@ -152,6 +152,7 @@ class _Grounded:
     fixed: Ints
     inner: Ints
     difference: csc_array
+    inwards: csr_array
     conductance: Floats
     lu: SuperLU | None
 
@@ -168,21 +169,30 @@ class _Grounded:
     def response(self, flow: Floats) -> Floats:
         """Voltages (K, D) that carry the current which these flows leave over at the inner nodes."""
         voltage = np.zeros((self.difference.shape[1], flow.shape[1]))
-        voltage[self.inner] = self.solve(self.difference[:, self.inner].T @ flow)
+        voltage[self.inner] = self.solve(self.inwards @ flow)
         return voltage
 
 
 def _grounded(circuit: Circuit, ports: Sequence[str]) -> _Grounded:
     fixed = port_nodes(circuit, ports)
     _refuse_islands(circuit, fixed)
-    inner = np.setdiff1d(np.arange(circuit.n_nodes), fixed)
+    inner = np.delete(np.arange(circuit.n_nodes), fixed)
     difference = _incidence(circuit)
     conductance = 1.0 / circuit.resistance
+    inwards = difference[:, inner].T
     lu = None
     if len(inner):
-        inwards = difference[:, inner].T.tocsr()
-        lu = splu(((inwards * conductance) @ difference[:, inner]).tocsc(), permc_spec="COLAMD")
-    return _Grounded(fixed, inner, difference, conductance, lu)
+        # Diagonally dominant, so no pivoting: twice as fast as COLAMD on the paper's cell, four times as fast on a
+        # denser one. Panels and relaxed supernodes would cost more than they save.
+        lu = splu(
+            ((inwards * conductance) @ inwards.T).tocsc(),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            panel_size=1,
+            relax=1,
+            options={"SymmetricMode": True},
+        )
+    return _Grounded(fixed, inner, difference, inwards, conductance, lu)
 
 
 def _incidence(circuit: Circuit) -> csc_array:

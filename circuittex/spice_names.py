@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections import Counter
 from collections.abc import Iterable
 
 _SAFE = re.compile(r"[a-z][a-z0-9_]*")
@@ -47,19 +48,25 @@ def unique_names(names: Iterable[str]) -> tuple[str, ...]:
     >>> unique_names(["a", "A", "a_2", "b"])
     ('a', 'a_3', 'a_2', 'b')
     """
-    words = [safe_name(name) for name in names]
-    taken = set(words)
-    if len(taken) == len(words):
+    words = list(names)
+    short = max(map(len, words), default=0) <= _LONGEST
+    if not (short and _RESERVED.isdisjoint(words) and all(map(_SAFE.fullmatch, words))):
+        words = [safe_name(word) for word in words]
+    count = Counter(words)
+    if len(count) == len(words):
         return tuple(words)
-    seen: set[str] = set()
+    taken = set(count)
     next_number: dict[str, int] = {}
     for i, word in enumerate(words):
-        if word in seen:
-            number = next_number.get(word, 2)
-            while f"{word}_{number}" in taken:
-                number += 1
-            next_number[word] = number + 1
-            words[i] = f"{word}_{number}"
-            taken.add(words[i])
-        seen.add(words[i])
+        if count[word] == 1:
+            continue
+        if word not in next_number:
+            next_number[word] = 2
+            continue
+        number = next_number[word]
+        while f"{word}_{number}" in taken:
+            number += 1
+        next_number[word] = number + 1
+        words[i] = f"{word}_{number}"
+        taken.add(words[i])
     return tuple(words)

@@ -9,11 +9,11 @@ from typing import ParamSpec, TypeVar
 
 import numpy as np
 
-from circuittex.circuit import Circuit, build_circuit
+from circuittex.circuit import Circuit, build_circuits
 from circuittex.contact.state import ContactState
 from circuittex.design import Probe, Terminal
 from circuittex.errors import NgspiceError
-from circuittex.fields import Fields, solve_probes
+from circuittex.fields import Fields, Potential, solve_potentials
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import Floats
 from circuittex.geometry.refine import refined
@@ -106,9 +106,11 @@ def verify(
         nan = float("nan")
         return Verification((), nan, nan, nan, 0.0, nan, nan, 0.0, 0.0, nan, False, "there are no probes to verify")
     clock = _Clock()
-    coarse = clock("fields", solve_probes, contacts, terminals, probes, mesh="mechanical")
-    _, full_fields, full_nodal = _native(clock, contacts, terminals, probes, fields)
-    circuits, *answers = _native(clock, simplified, terminals, probes, None)
+    coarse = clock("fields", solve_potentials, contacts, terminals, probes, mesh="mechanical")
+    full = clock("fields", solve_potentials, contacts, terminals, probes) if fields is None else fields
+    _, full_fields, full_nodal = _native(clock, contacts, terminals, probes, full)
+    merged = clock("fields", solve_potentials, simplified, terminals, probes)
+    circuits, *answers = _native(clock, simplified, terminals, probes, merged)
     routes = dict(zip(("fields", "nodal"), answers, strict=True))
     yarn = _yarn_currents(contacts, probes)
     native = _difference(full_fields, full_nodal, yarn), _difference(answers[0], answers[1], yarn)
@@ -165,7 +167,7 @@ def field_convergence(
         finer = replace(
             contacts, mesh=refined(mesh, pieces), axial_factor=np.repeat(contacts.axial_factor, mesh.order * pieces)
         )
-        currents = [f.currents[0] for f in solve_probes(finer, terminals, probes, mesh="mechanical")]
+        currents = [f.currents[0] for f in solve_potentials(finer, terminals, probes, mesh="mechanical")]
         rows.append((distance / pieces, _relative(currents, exact, yarn)))
     return np.array(rows)
 
@@ -194,14 +196,13 @@ def _native(
     contacts: ContactState,
     terminals: Sequence[Terminal],
     probes: Sequence[Probe],
-    fields: Sequence[Fields] | None,
+    fields: Sequence[Fields | Potential],
 ) -> tuple[list[Circuit], list[_Answer], list[_Answer]]:
-    """The circuit of each probe, and what finite elements (unless given) and nodal analysis say about it."""
-    circuits = [build_circuit(contacts, _pair(terminals, probe)) for probe in probes]
-    solved = clock("fields", solve_probes, contacts, terminals, probes) if fields is None else fields
+    """The circuit of each probe, and what finite elements, solved already, and nodal analysis say about it."""
+    circuits = build_circuits(contacts, [_pair(terminals, probe) for probe in probes])
     return (
         circuits,
-        [_from_fields(c, f) for c, f in zip(circuits, solved, strict=True)],
+        [_from_fields(c, f) for c, f in zip(circuits, fields, strict=True)],
         [clock("nodal", _nodal, c, p) for c, p in zip(circuits, probes, strict=True)],
     )
 
@@ -215,7 +216,7 @@ def _nodal(circuit: Circuit, probe: Probe) -> _Answer:
     return _Answer(solution.voltage / probe.voltage, float(solution.port_current[circuit.ports.index(probe.source)]))
 
 
-def _from_fields(circuit: Circuit, fields: Fields) -> _Answer:
+def _from_fields(circuit: Circuit, fields: Fields | Potential) -> _Answer:
     """The finite element solution at the nodes of the circuit; between its own nodes it is linear."""
     inner, known = circuit.node_fibril >= 0, np.isfinite(fields.potential)
     voltage = np.zeros(circuit.n_nodes)

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from electrical_cases import end, fibrils, touching
 from electrical_reference import FOUR_DIGITS, INSULATED_SEGMENT_OHM, INSULATED_YARN_CURRENT
+from synthetic import woven
 
 from circuittex.circuit import (
     CONTACT,
     SEGMENT,
     build_circuit,
+    build_circuits,
     islands,
     port_nodes,
     reached_part,
@@ -24,6 +26,7 @@ from circuittex.circuit import (
 )
 from circuittex.design import Terminal, plain_weave
 from circuittex.errors import CircuitError
+from circuittex.frozen import same
 from circuittex.geometry.weave import build_mesh
 from circuittex.nodal import solve_nodal
 
@@ -164,6 +167,15 @@ def test_contacts_without_current_are_left_out_and_counted():
 def test_a_fibril_that_touches_itself():
     circuit = build_circuit(touching(fibrils([3.0], [1.0]), [(0, 0, 1.0, 2.0, 1.0)]), [end(1, -1), end(1, 1)])
     assert resistance(circuit, "y1m", "y1p") == pytest.approx(2.5, rel=ROUNDING)
+
+
+def test_circuits_of_several_terminals_are_the_same_as_one_by_one():
+    state = woven(per_yarn=2, points=4)
+    ends = yarn_end_terminals(state.mesh)
+    choices = [ends[:2], ends[3:5], ends]
+    for choice, circuit in zip(choices, build_circuits(state, choices, dropped_contacts=3), strict=True):
+        assert same(circuit, build_circuit(state, choice, dropped_contacts=3))
+        assert circuit.ports == tuple(terminal.name for terminal in choice)
 
 
 def test_islands_are_left_out_and_listed():

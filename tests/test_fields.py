@@ -8,12 +8,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from skfem import Basis, Element, ElementLineP1, ElementLineP2, MeshLine
 from synthetic import fibrils, rails, touching, woven
 
 from circuittex.contact.state import ContactState
 from circuittex.design import Probe, Terminal
 from circuittex.errors import DesignError
-from circuittex.fields import Fields, solve_fields, solve_probes
+from circuittex.fields import Fields, solve_fields, solve_potentials, solve_probes
+from circuittex.fields.line import fibril_line
+from circuittex.fields.solution import Mesh
+from circuittex.fields.system import build_system, outflow
 
 AREA = np.pi * 0.15**2
 
@@ -249,6 +253,29 @@ def test_several_probes_at_once_are_the_same_as_one_by_one() -> None:
         alone = solve_fields(state, PAPER_TERMINALS, probe)
         assert_allclose(alone.potential, found.potential, rtol=1e-13, atol=1e-15)
         assert_allclose(alone.temperature, found.temperature, rtol=1e-12, atol=1e-16)
+
+
+@pytest.mark.parametrize("mesh", ["feet", "mechanical"])
+def test_potentials_without_temperatures_are_the_same(mesh: Mesh) -> None:
+    state = woven(per_yarn=2, points=4)
+    whole = solve_probes(state, PAPER_TERMINALS, PAPER_PROBES, mesh=mesh)
+    found = solve_potentials(state, PAPER_TERMINALS, PAPER_PROBES, mesh=mesh)
+    assert solve_potentials(state, PAPER_TERMINALS, [], mesh=mesh) == ()
+    for one, other in zip(whole, found, strict=True):
+        assert (one.voltage, one.terminals) == (other.voltage, other.terminals)
+        for name in ("currents", "fibril", "xi", "potential"):
+            assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+@pytest.mark.parametrize("element", [ElementLineP1(), ElementLineP2()])
+def test_what_leaves_element_by_element_is_what_the_stiffness_says(element: Element) -> None:
+    state = woven(per_yarn=2, points=4)
+    line = fibril_line(state, refine=False)
+    axes = MeshLine(line.xi[None, :], line.segments.T, sort_t=False, validate=False)
+    system = build_system(Basis(axes, element), line, line.conduction, state.conductance)
+    x = np.random.default_rng(1).normal(size=system.stiffness.shape[0])
+    expected = system.stiffness @ x
+    assert_allclose(outflow(system, x), expected, atol=1e-12 * np.abs(expected).max())
 
 
 def test_linear_in_the_voltage_and_quadratic_in_temperature() -> None:

@@ -89,6 +89,12 @@ def test_derivatives_are_those_of_differences():
     np.testing.assert_allclose(exact, differences, rtol=1e-7)  # h² and 1e-16 / h both lie below
 
 
+def test_conductances_that_are_remembered_cannot_be_changed():
+    found = network_conductances(DESIGN, 0.28, 3.0)
+    with pytest.raises(ValueError, match="read-only"):
+        found[0] = 0.0
+
+
 def test_covariance_is_that_of_the_scatter():
     # Relative noise of known size on the currents: the spread of the fits must be what the covariance says.
     rng = np.random.default_rng(3)

@@ -175,6 +175,11 @@ def test_unsafe_names_stay_apart():
     )
 
 
+def test_safe_names_that_repeat_get_the_first_free_numbers():
+    assert unique_names(["a", "a_2", "a", "b", "a", "a_2"]) == ("a", "a_2", "a_3", "b", "a_4", "a_2_2")
+    assert unique_names([]) == ()
+
+
 def test_long_names_that_differ_late_stay_different():
     """All states of a design with a long title: the names of their sub-circuits are not cut to the same word."""
     title = "a weave of many words " * 6

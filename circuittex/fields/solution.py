@@ -19,6 +19,9 @@ from circuittex.fields.system import System, balance, build_system, constant_sou
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
 
+Mesh = Literal["feet", "mechanical"]
+"""Nodes at the feet of the contacts, or those of the mechanics."""
+
 
 @frozen
 class Fields:
@@ -54,13 +57,31 @@ class Fields:
     """(U,) conducting fibrils that no driven terminal reaches."""
 
 
+@frozen
+class Potential:
+    """What `Fields` says about the potential of one probe, under the same names."""
+
+    voltage: float
+    """Source above sink, V."""
+    terminals: tuple[str, ...]
+    """(T,) the driven terminals: source, sink."""
+    currents: Floats
+    """(T,) current into the textile at each of them [42], A."""
+    fibril: Ints
+    """(K,) fibril of each node; fibril after fibril, xi ascending."""
+    xi: Floats
+    """(K,) axis coordinate of each node, mm."""
+    potential: Floats
+    """(K,) V [38]; nan on insulating fibrils and on those no driven terminal reaches."""
+
+
 def solve_fields(
     contacts: ContactState,
     terminals: Sequence[Terminal],
     probe: Probe,
     *,
     contact_heat: bool = True,
-    mesh: Literal["feet", "mechanical"] = "feet",
+    mesh: Mesh = "feet",
 ) -> Fields:
     """Solve [38] for the potential and then [37] for the temperature of one probe.
 
@@ -84,7 +105,7 @@ def solve_probes(
     probes: Sequence[Probe],
     *,
     contact_heat: bool = True,
-    mesh: Literal["feet", "mechanical"] = "feet",
+    mesh: Mesh = "feet",
 ) -> tuple[Fields, ...]:
     """Solve the potential [38] and the temperature [37] for each probe on a frozen contact state.
 
@@ -99,19 +120,45 @@ def solve_probes(
 
     Raises DesignError where a probe names a terminal, or a terminal a yarn end, that does not exist.
     """
-    if mesh not in ("feet", "mechanical"):
-        raise DesignError("mesh", mesh, "allowed are 'feet' and 'mechanical'")
+    line, axes = _line(contacts, mesh)
     if not probes:
         return ()
-    line = fibril_line(contacts, refine=mesh == "feet")
-    axes = MeshLine(line.xi[None, :], np.ascontiguousarray(line.segments.T), sort_t=False, validate=False)
-    electric = build_system(Basis(axes, ElementLineP1()), line, line.conduction, _electric_conductance(contacts))
+    flows = _flows(contacts, line, axes, terminals, probes)
     thermal = build_system(Basis(axes, ElementLineP2()), line, line.thermal, contacts.heat_conductance)
-    flows = [_flow(contacts, line, electric, terminals, probe) for probe in probes]
     loads = np.stack([_joule_heat(thermal, flow, contact_heat) for flow in flows])
-    inside = np.setdiff1d(np.arange(loads.shape[1]), line.ends)
+    inside = np.delete(np.arange(loads.shape[1]), line.ends)
     temperatures = balance(thermal, loads, np.zeros(loads.shape[1]), inside)
     return tuple(_fields(line, thermal, *one) for one in zip(probes, flows, loads, temperatures, strict=True))
+
+
+def solve_potentials(
+    contacts: ContactState,
+    terminals: Sequence[Terminal],
+    probes: Sequence[Probe],
+    *,
+    mesh: Mesh = "feet",
+) -> tuple[Potential, ...]:
+    """The potentials and currents of `solve_probes`, for whoever has no use for the temperatures."""
+    line, axes = _line(contacts, mesh)
+    return tuple(
+        Potential(
+            voltage=probe.voltage,
+            terminals=(probe.source, probe.sink),
+            currents=flow.terminal_currents,
+            fibril=line.fibril,
+            xi=line.xi,
+            potential=flow.potential,
+        )
+        for probe, flow in zip(probes, _flows(contacts, line, axes, terminals, probes), strict=True)
+    )
+
+
+def _line(contacts: ContactState, mesh: Mesh) -> tuple[FibrilLine, MeshLine]:
+    """The line mesh of all fibrils, and the same for scikit-fem."""
+    if mesh not in ("feet", "mechanical"):
+        raise DesignError("mesh", mesh, "allowed are 'feet' and 'mechanical'")
+    line = fibril_line(contacts, refine=mesh == "feet")
+    return line, MeshLine(line.xi[None, :], np.ascontiguousarray(line.segments.T), sort_t=False, validate=False)
 
 
 def _fields(line: FibrilLine, thermal: System, probe: Probe, flow: _Flow, load: Floats, temperature: Floats) -> Fields:
@@ -158,6 +205,14 @@ class _Flow:
     """(S,) Joule heat per length of axis sigma A V'^2, W/mm."""
     contact_heat: Floats
     """(C,) Joule heat of each contact, W."""
+
+
+def _flows(
+    contacts: ContactState, line: FibrilLine, axes: MeshLine, terminals: Sequence[Terminal], probes: Sequence[Probe]
+) -> list[_Flow]:
+    """Potential and currents of each probe."""
+    electric = build_system(Basis(axes, ElementLineP1()), line, line.conduction, _electric_conductance(contacts))
+    return [_flow(contacts, line, electric, terminals, probe) for probe in probes]
 
 
 def _flow(

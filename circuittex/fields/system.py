@@ -42,12 +42,6 @@ def _conduction(u: Any, v: Any, w: Any) -> Any:
 
 
 @LinearForm  # type: ignore[untyped-decorator]
-def _flux(v: Any, w: Any) -> Any:
-    """∫ c x' v' dxi of a known field."""
-    return w.coefficient * dot(grad(w.known), grad(v))
-
-
-@LinearForm  # type: ignore[untyped-decorator]
 def _source(v: Any, w: Any) -> Any:
     """∫ q v dxi."""
     return w.density * v
@@ -84,7 +78,12 @@ def outflow(system: System, x: Floats) -> Floats:
     In the assembled matrix a short element's large conductance swamps its small neighbours; summed element by
     element, what enters it is exactly what leaves it.
     """
-    inside: Floats = _flux.assemble(system.basis, coefficient=system.coefficient, known=system.basis.interpolate(x))
+    basis = system.basis
+    dofs, shapes = basis.element_dofs, [np.asarray(shape.grad[0]) for (shape,) in basis.basis]
+    # ∫ c x' v' dxi by the same steps as a form of scikit-fem, whose bookkeeping would take most of the time.
+    slope = sum(x[dof][:, None] * shape for dof, shape in zip(dofs, shapes, strict=True))
+    into = [np.sum(system.coefficient * (slope * shape) * basis.dx, axis=1) for shape in shapes]
+    inside = np.bincount(dofs.ravel(), np.concatenate(into), basis.N)
     outside: Floats = system.jump.T @ (system.conductance * (system.jump @ x))
     return inside + outside
 
@@ -95,10 +94,13 @@ def balance(system: System, load: Floats, value: Floats, free: Ints) -> Floats:
     if not len(free):
         return x
     # Positive definite, so no pivoting: as fast as COLAMD on the paper's cell, three times as fast on a denser one.
+    # Panels and relaxed supernodes double the time on the paper's cell and save none on denser ones.
     factor = splu(
         system.stiffness[free][:, free].tocsc(),
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
+        panel_size=1,
+        relax=1,
         options={"SymmetricMode": True},
     )
     for _ in range(1 + REFINEMENTS):

@@ -18,7 +18,7 @@ from circuittex.geometry.mesh import Floats, Ints
 SMALL = 3000
 """Unknowns that are not dissected any more."""
 CUTS = (0.5, 0.45, 0.55, 0.4, 0.6)
-"""Where cuts are tried along each axis: the fraction of the parts that lies before them. The first of equals counts."""
+"""Where cuts are tried along an axis: the fraction of the parts that lies before them. The first of equals counts."""
 
 
 def dissect(graph: sp.csr_array, width: Ints, position: Floats) -> Ints:
@@ -52,7 +52,7 @@ def _best_cut(graph: sp.csr_array, width: Ints, position: Floats) -> list[NDArra
     """
     i, j = np.repeat(np.arange(len(width)), np.diff(graph.indptr)), graph.indices
     best, narrowest = None, width.sum() / 4  # where no cut is narrower, minimum degree does better
-    for axis in range(3):
+    for axis in np.argsort(-np.ptp(position, axis=0))[:2]:  # a fabric is flat
         for place in np.quantile(position[:, axis], CUTS):
             before = position[:, axis] < place
             crossing = before[i] & ~before[j]

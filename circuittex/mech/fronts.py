@@ -93,27 +93,21 @@ def analyse(pattern: Pattern, pair: Ints, coupled: NDArray[np.bool_]) -> Analysi
     border = _ranges((np.cumsum(width) - width)[bordering], width[bordering])
     owner = np.repeat(owner, width[bordering])
     b = np.bincount(owner, minlength=len(p))
-    cut = np.cumsum(b) - b
-    labelled = owner * n + border
-
-    def local(front: Ints, unknown: Ints) -> Ints:
-        """Where unknowns are in fronts: among the pivots, or in the border behind them."""
-        behind = p[front] + np.searchsorted(labelled, front * n + unknown) - cut[front]
-        return np.where(front_of[unknown] == front, unknown - first[front], behind)
-
+    cut = np.concatenate([[0], np.cumsum(b)])
     above = np.full(len(p), -1)
-    above[b > 0] = front_of[border[cut[b > 0]]]
-    places = local(above[owner], border)
+    above[b > 0] = front_of[border[cut[:-1][b > 0]]]
+    places = np.empty(len(border), dtype=np.int64)
+    _find(above[owner], border, first, p, cut, border, places)
     size = p * (p + b)
     start = np.cumsum(size) - size
     fronts = tuple(
         Front(
             first=int(first[k]),
             pivots=int(p[k]),
-            border=border[cut[k] : cut[k] + b[k]],
+            border=border[cut[k] : cut[k + 1]],
             start=int(start[k]),
             above=int(above[k]),
-            places=places[cut[k] : cut[k] + b[k]],
+            places=places[cut[k] : cut[k + 1]],
         )
         for k in range(len(p))
     )
@@ -121,10 +115,23 @@ def analyse(pattern: Pattern, pair: Ints, coupled: NDArray[np.bool_]) -> Analysi
     entries = np.flatnonzero(np.append(coupled, True)[pair])  # pair -1 takes the last: True
     i = place[np.repeat(np.arange(n), np.diff(pattern.indptr))[entries]]
     j = place[pattern.indices[entries]]
-    front, row = front_of[np.minimum(i, j)], np.minimum(i, j)
-    row, column, triangle = row - first[front], local(front, np.maximum(i, j)), p[front]
-    inside = np.where(column < triangle, row * triangle + column, triangle**2 + row * b[front] + column - triangle)
+    row, column = np.minimum(i, j), np.maximum(i, j)
+    front = front_of[row]
+    target = np.empty(len(entries), dtype=np.int64)
+    _find(front, column, first, p, cut, border, target)
+    row, triangle = row - first[front], p[front]
+    inside = np.where(target < triangle, row * triangle + target, triangle**2 + row * b[front] + target - triangle)
     return Analysis(order=order, fronts=fronts, entries=entries, target=start[front] + inside, size=int(size.sum()))
+
+
+@compiled
+def _find(front: Any, unknown: Any, first: Any, pivots: Any, cut: Any, border: Any, found: Any) -> None:
+    """Fill found with where unknowns are in fronts: among the pivots, or in the border behind them."""
+    for k in range(front.shape[0]):
+        f = front[k]
+        found[k] = unknown[k] - first[f]
+        if found[k] >= pivots[f]:
+            found[k] = pivots[f] + np.searchsorted(border[cut[f] : cut[f + 1]], unknown[k])
 
 
 def _ranges(first: Ints, length: Ints) -> Ints:

@@ -6,8 +6,8 @@ Each weave of N x N yarns of ten fibrils is relaxed in a process of its own, so 
 weave has the paper's number of elements a crossing, so a fibril of the 16 x 16 weave has four times as many elements as
 one of the paper's cell: 320 fibrils with the length of 1,280 of that cell, and the work is best counted in elements.
 The exponents compare a size with the one before it in the table. With --iterations a relaxation is cut short; what is
-comparable then is the time of an iteration. With --keep the sizes measured are added to a file, whose other sizes
-complete the tables; that lets a large size run alone and later.
+comparable then is the time of an iteration, and the first ones are short. With --keep the sizes measured are added to a
+file, whose other sizes complete the tables; that lets a large size run alone and later.
 """
 
 from __future__ import annotations
@@ -106,7 +106,9 @@ def tables(results: Sequence[Result]) -> list[Table]:
     rows: list[list[object]] = []
     for k, result in enumerate(results):
         costs = "seconds", "each", "memory"
-        powers = [exponent(results[k - 1], result, cost) if k else "" for cost in costs]
+        powers: list[object] = [exponent(results[k - 1], result, cost) if k else "" for cost in costs]
+        if result["residual"] > plain_weave().numerics.tolerance:  # cut short
+            powers[0] = ""
         rows.append([*(result[key] for key in keys), *(result[cost] for cost in costs), *powers])
     shares = [[part, *(result["shares"][part] for result in results)] for part in PARTS]
     shares = [row for row in shares if any(row[1:])]

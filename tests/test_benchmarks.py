@@ -213,12 +213,14 @@ def test_scaling_measures_a_size_and_compares_two() -> None:
     assert (small["fibrils"], small["elements"], small["iterations"]) == (20, 80, 2)
     assert sum(small["shares"].values()) == pytest.approx(100)
     assert small["memory"] > 50  # MB: Python with NumPy and SciPy alone
-    large = {**small, "yarns": 2, "elements": 8 * 80, "seconds": 64 * small["seconds"]}
+    large = {**small, "yarns": 2, "elements": 8 * 80, "seconds": 64 * small["seconds"], "residual": 1e-7}
     costs, shares = scaling.tables([small, large])
     assert len(costs.rows[0]) == len(scaling.HEAD)
     assert costs.rows[0][-3:] == ["", "", ""]
     assert costs.rows[1][-3:] == pytest.approx([2, 0, 0])
     assert shares.head == ["part", "1 x 1", "2 x 2"]
+    costs, _ = scaling.tables([small, {**large, "residual": 1e-3}])  # cut short: its seconds compare with nothing
+    assert costs.rows[1][-3] == ""
 
 
 def test_algorithm_1_comes_to_rest_in_the_equilibrium() -> None:

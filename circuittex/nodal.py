@@ -50,18 +50,19 @@ class PortBasis:
         """Return the solution for voltages at exactly these driven ports.
 
         The current into port p is the energy product Σ G Δφ_p ΔV. It equals the sum of the currents that leave the
-        port, but that sum loses the digits of ΔV where a port hangs on a tiny resistor. Voltages are taken from the
-        first port, so that what all ports have in common costs no digits either.
+        port, but that sum loses the digits of ΔV where a port hangs on a tiny resistor. Voltages are taken from that of
+        the middle port, so that what most ports have in common costs no digits either.
 
         Raises `CircuitError` where the currents break Kirchhoff's law: they do not add up to zero.
         """
         volts = np.array([drive[port] for port in self.ports], dtype=np.float64)
-        above = self.potential @ (volts - volts[0])
+        middle = np.sort(volts)[len(volts) // 2]
+        above = self.potential @ (volts - middle)
         current = np.zeros(len(self.circuit.ports))
-        drop = self.circuit.resistance * (self.flow @ (volts - volts[0]))
+        drop = self.circuit.resistance * (self.flow @ (volts - middle))
         current[[self.circuit.ports.index(port) for port in self.ports]] = self.flow.T @ drop
         self._refuse_unbalanced(current, volts)
-        return NodalSolution(voltage=above + volts[0], port_current=current)
+        return NodalSolution(voltage=above + middle, port_current=current)
 
     def _refuse_unbalanced(self, current: Floats, volts: Floats) -> None:
         """Raise where the currents do not add up to zero; currents that are all rounding are as good as none."""
@@ -182,16 +183,8 @@ def _grounded(circuit: Circuit, ports: Sequence[str]) -> _Grounded:
     inwards = difference[:, inner].T
     lu = None
     if len(inner):
-        # Diagonally dominant, so no pivoting: twice as fast as COLAMD on the paper's cell, four times as fast on a
-        # denser one. Panels and relaxed supernodes would cost more than they save.
-        lu = splu(
-            ((inwards * conductance) @ inwards.T).tocsc(),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            panel_size=1,
-            relax=1,
-            options={"SymmetricMode": True},
-        )
+        # Without pivoting, in the order of minimum degree, it is twice as fast but loses a twelfth digit.
+        lu = splu(((inwards * conductance) @ inwards.T).tocsc(), permc_spec="COLAMD")
     return _Grounded(fixed, inner, difference, inwards, conductance, lu)
 
 

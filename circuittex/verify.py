@@ -196,7 +196,7 @@ def _native(
     contacts: ContactState,
     terminals: Sequence[Terminal],
     probes: Sequence[Probe],
-    fields: Sequence[Fields | Potential],
+    fields: Sequence[Potential],
 ) -> tuple[list[Circuit], list[_Answer], list[_Answer]]:
     """The circuit of each probe, and what finite elements, solved already, and nodal analysis say about it."""
     circuits = build_circuits(contacts, [_pair(terminals, probe) for probe in probes])
@@ -216,7 +216,7 @@ def _nodal(circuit: Circuit, probe: Probe) -> _Answer:
     return _Answer(solution.voltage / probe.voltage, float(solution.port_current[circuit.ports.index(probe.source)]))
 
 
-def _from_fields(circuit: Circuit, fields: Fields | Potential) -> _Answer:
+def _from_fields(circuit: Circuit, fields: Potential) -> _Answer:
     """The finite element solution at the nodes of the circuit; between its own nodes it is linear."""
     inner, known = circuit.node_fibril >= 0, np.isfinite(fields.potential)
     voltage = np.zeros(circuit.n_nodes)

@@ -17,7 +17,7 @@ from electrical_reference import (
     WOVEN_ROUNDING,
     WOVEN_RY,
 )
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from circuittex.circuit import build_circuit, reduced_circuit
@@ -159,6 +159,7 @@ def test_power_in_equals_power_lost(case, u, v):
 
 
 @given(connected_networks())
+@example((7, [(0, 1, 1.0), (1, 2, 1e-4), (0, 3, 1.0), (0, 4, 1.0), (2, 5, 1e-5), (0, 6, 1.0), (2, 6, 1e-5)]))
 def test_reciprocity(case):
     n, edges = case
     assume(n > 3)

@@ -99,7 +99,6 @@ import circuittex.folder
 import test_study
 from canned import report
 circuittex.folder.write_report = report
-from circuittex.compiled import available_cores
 from circuittex.study import run_study
 run_study(test_study.cell(), sys.argv[2], workers=int(sys.argv[3]))
 """

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from circuittex.contact.curve import CurveTable, bezier
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import Floats, Ints
-from circuittex.mech.pattern import distinct
+from circuittex.mech.pattern import distinct, ranges
 
 CONTROL_MOTION = 4 / 3
 """A Bézier point moves at most this times as far as the nodes that define it (the sum of its weights' magnitudes)."""
@@ -63,13 +63,11 @@ def coupled_nodes(table: CurveTable, candidates: Candidates) -> Ints:
     window = table.window
     start, stop = window[candidates.first], window[candidates.last] + 4
     count = stop - start
-    row = np.repeat(np.arange(len(count)), count)
-    other = start[row] + np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
     n = int(window.max()) + 4
-    key = distinct(window[candidates.interval][row] * n + other)  # windows of one, nodes of the other
-    between = np.stack([(key // n)[:, None] + np.arange(4), np.repeat(key % n, 4).reshape(-1, 4)], axis=2).reshape(
-        -1, 2
-    )
+    # windows of one, nodes of the other
+    key = distinct(np.repeat(window[candidates.interval], count) * n + ranges(start, count))
+    mine, other = np.repeat(key // n, 4) + np.tile(np.arange(4), len(key)), np.repeat(key % n, 4)
+    between = np.stack([mine, other], axis=1)
     i, j = np.triu_indices(4, 1)
     within = distinct(window)[:, None, None] + np.stack([i, j], axis=1)
     return np.concatenate([between, within.reshape(-1, 2)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,8 @@ Mesh = Literal["feet", "mechanical"]
 
 
 @frozen
-class Fields:
-    """Potential, temperature and currents of one probe on one contact state."""
+class Potential:
+    """Potential and terminal currents of one probe on one contact state."""
 
     probe: str
     """Name of the probe."""
@@ -41,6 +41,12 @@ class Fields:
     """(K,) axis coordinate of each node, mm."""
     potential: Floats
     """(K,) V [38]; nan on insulating fibrils and on those no driven terminal reaches."""
+
+
+@frozen
+class Fields(Potential):
+    """Potential, temperature and currents of one probe on one contact state."""
+
     temperature: Floats
     """(K,) rise over the surroundings [37], K."""
     segments: Ints
@@ -55,24 +61,6 @@ class Fields:
     """Largest temperature rise, inside the elements included, K."""
     unreached: Ints
     """(U,) conducting fibrils that no driven terminal reaches."""
-
-
-@frozen
-class Potential:
-    """What `Fields` says about the potential of one probe, under the same names."""
-
-    voltage: float
-    """Source above sink, V."""
-    terminals: tuple[str, ...]
-    """(T,) the driven terminals: source, sink."""
-    currents: Floats
-    """(T,) current into the textile at each of them [42], A."""
-    fibril: Ints
-    """(K,) fibril of each node; fibril after fibril, xi ascending."""
-    xi: Floats
-    """(K,) axis coordinate of each node, mm."""
-    potential: Floats
-    """(K,) V [38]; nan on insulating fibrils and on those no driven terminal reaches."""
 
 
 def solve_fields(
@@ -141,14 +129,7 @@ def solve_potentials(
     """The potentials and currents of `solve_probes`, for whoever has no use for the temperatures."""
     line, axes = _line(contacts, mesh)
     return tuple(
-        Potential(
-            voltage=probe.voltage,
-            terminals=(probe.source, probe.sink),
-            currents=flow.terminal_currents,
-            fibril=line.fibril,
-            xi=line.xi,
-            potential=flow.potential,
-        )
+        Potential(**_electric(line, probe, flow))
         for probe, flow in zip(probes, _flows(contacts, line, axes, terminals, probes), strict=True)
     )
 
@@ -165,13 +146,7 @@ def _fields(line: FibrilLine, thermal: System, probe: Probe, flow: _Flow, load: 
     """What is kept of one solution."""
     ends = line.ends.ravel()
     return Fields(
-        probe=probe.name,
-        voltage=probe.voltage,
-        terminals=(probe.source, probe.sink),
-        currents=flow.terminal_currents,
-        fibril=line.fibril,
-        xi=line.xi,
-        potential=flow.potential,
+        **_electric(line, probe, flow),
         temperature=temperature[: len(line.xi)],
         segments=line.segments,
         segment_current=flow.along,
@@ -180,6 +155,19 @@ def _fields(line: FibrilLine, thermal: System, probe: Probe, flow: _Flow, load: 
         peak_temperature=peak(thermal.basis, temperature),
         unreached=flow.unreached,
     )
+
+
+def _electric(line: FibrilLine, probe: Probe, flow: _Flow) -> dict[str, Any]:
+    """The values of a `Potential` by name."""
+    return {
+        "probe": probe.name,
+        "voltage": probe.voltage,
+        "terminals": (probe.source, probe.sink),
+        "currents": flow.terminal_currents,
+        "fibril": line.fibril,
+        "xi": line.xi,
+        "potential": flow.potential,
+    }
 
 
 def _electric_conductance(contacts: ContactState) -> Floats:

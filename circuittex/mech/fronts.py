@@ -21,7 +21,7 @@ from circuittex.compiled import compiled
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import Ints
 from circuittex.mech.dissection import dissect
-from circuittex.mech.pattern import Pattern
+from circuittex.mech.pattern import Pattern, ranges
 from circuittex.mech.space import DOFS
 
 POSITION = 3
@@ -80,17 +80,17 @@ def analyse(pattern: Pattern, pair: Ints, coupled: NDArray[np.bool_]) -> Analysi
     by_front = np.argsort(front_of_turn, kind="stable")
     parts, turn = parts[by_front], np.argsort(by_front)
     width = width[parts]
-    order = _ranges(DOFS * (parts // 2) + POSITION * (parts % 2), width)
+    order = ranges(DOFS * (parts // 2) + POSITION * (parts % 2), width)
     place, front_of = np.argsort(order), np.repeat(front_of_turn[by_front], width)
     p = np.bincount(front_of)
     first = np.cumsum(p) - p
 
     # Borders, one after another in the order of the fronts.
     owner = np.repeat(np.arange(len(tops)), begin[tops + 1] - begin[tops])
-    bordering = turn[later[_ranges(begin[tops], begin[tops + 1] - begin[tops])]]
+    bordering = turn[later[ranges(begin[tops], begin[tops + 1] - begin[tops])]]
     sort = np.lexsort((bordering, owner))
     owner, bordering = owner[sort], bordering[sort]
-    border = _ranges((np.cumsum(width) - width)[bordering], width[bordering])
+    border = ranges((np.cumsum(width) - width)[bordering], width[bordering])
     owner = np.repeat(owner, width[bordering])
     b = np.bincount(owner, minlength=len(p))
     cut = np.concatenate([[0], np.cumsum(b)])
@@ -132,11 +132,6 @@ def _find(front: Any, unknown: Any, first: Any, pivots: Any, cut: Any, border: A
         found[k] = unknown[k] - first[f]
         if found[k] >= pivots[f]:
             found[k] = pivots[f] + np.searchsorted(border[cut[f] : cut[f + 1]], unknown[k])
-
-
-def _ranges(first: Ints, length: Ints) -> Ints:
-    """first, first + 1, ... of each range, one range after another."""
-    return np.repeat(first - np.cumsum(length) + length, length) + np.arange(length.sum())
 
 
 def _graph(pattern: Pattern, coupled: NDArray[np.bool_]) -> sp.csr_array:

@@ -26,8 +26,7 @@ from circuittex.mech.pattern import Pattern
 class MultifrontalSolver:
     """Cholesky by dense fronts, which are kept until the pattern changes or node pairs come to be coupled.
 
-    The pattern has room for all fibrils that may touch. Those that do not have zeros there, and the factor of what is
-    not zero needs about a quarter of the operations.
+    The pattern has room for all fibrils that may touch. Those that do not have zeros there, which are left out.
 
     >>> from circuittex.mech.pattern import build_pattern, diagonal
     >>> pattern = build_pattern(2, np.array([[0, 1]]), np.empty((0, 2), dtype=int))

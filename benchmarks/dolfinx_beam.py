@@ -91,7 +91,7 @@ class Ours:
         self.assemble()
         n = len(self.q)
         upper = sp.csr_array((self.data, self.pattern.indices, self.pattern.indptr), shape=(n, n))
-        at = (9 * self.space.slot[answer["node"]][:, None] + np.arange(9)).ravel()
+        at = (9 * answer["node"][:, None] + np.arange(9)).ravel()
         tangent = (upper + sp.triu(upper, 1).T).tocsr()[at][:, at]
         theirs = sp.csr_array((answer["value"], answer["column"], answer["start"]), shape=(n, n))
         gradient = np.abs(answer["gradient"] - self.gradient[at]).max() / np.abs(self.gradient).max()

@@ -83,7 +83,7 @@ class DeadLoad:
 
 def dofs(space: BeamSpace, node: int, rows: Sequence[int] = (0, 1, 2)) -> Ints:
     """The unknowns of a node: all components of `rows`, 0 for r, 1 for g1, 2 for g2."""
-    return np.concatenate([DOFS * space.slot[node] + 3 * row + np.arange(3) for row in rows])
+    return np.concatenate([DOFS * np.arange(space.mesh.n_nodes)[node] + 3 * row + np.arange(3) for row in rows])
 
 
 def tip_load(space: BeamSpace, force: ArrayLike) -> DeadLoad:

@@ -169,7 +169,7 @@ def contact_term(
 ) -> tuple[PenaltyContact, Floats]:
     """The contact term of a mesh and the vector of unknowns of its initial configuration."""
     space = beam_space(mesh)
-    term = PenaltyContact(mesh, space.slot, penalty=penalty, per_element=per_element, skin=skin)
+    term = PenaltyContact(mesh, penalty=penalty, per_element=per_element, skin=skin)
     return term, space.vector(initial_configuration(mesh))
 
 

@@ -147,7 +147,7 @@ def test_candidates_hold_for_motions_within_the_skin(seed: int, share: float) ->
     motion = np.random.default_rng(seed).normal(size=r.shape)
     motion *= share * skin / (2 * CONTROL_MOTION) / np.linalg.norm(motion, axis=1)[:, None]
     moved = q.reshape(-1, 9).copy()
-    moved[term.slot, :3] += motion
+    moved[:, :3] += motion
     assert not term.prepare(moved.ravel())
     assert close_pairs(mesh, table, r + motion, 0.0) <= covered(kept)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -10,7 +12,7 @@ from hypothesis import strategies as st
 
 import circuittex.mech.dissection as dissection
 from circuittex.geometry.mesh import Floats, Ints
-from circuittex.mech.dissection import dissect
+from circuittex.mech.dissection import dissect, narrowed
 
 
 def lattice(side: int) -> tuple[sp.csr_array, Floats]:
@@ -42,6 +44,34 @@ def test_every_part_has_one_turn(n: int, seed: int, small: int) -> None:
         patch.setattr(dissection, "SMALL", small)
         order = dissect(sp.csr_array((some | some.T).astype(float)), rng.integers(1, 7, n), position)
     assert np.array_equal(np.sort(order), np.arange(n))
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.integers(3, 9), st.integers(0, 2**32 - 1))
+def test_the_narrowed_separator_is_the_narrowest_nearby(n: int, seed: int) -> None:
+    """Against all divisions of the separator and its neighbours, tried one after another."""
+    rng = np.random.default_rng(seed)
+    some = np.triu(rng.random((n, n)) < 0.4, 1)
+    graph, width = sp.csr_array((some | some.T).astype(float)), rng.integers(1, 7, n)
+    side = rng.integers(0, 2, n).astype(bool)
+    edge = side & ((some | some.T) @ ~side)
+    cut = [side & ~edge, ~side, edge]
+    first, last, separator = narrowed(graph, width, cut)
+    assert np.array_equal(first.astype(int) + last + separator, np.ones(n))
+    assert not (graph.toarray()[np.ix_(first, last)] > 0).any()
+    band = edge | (graph @ edge > 0)
+    kept = [half & ~band for half in cut[:2]]
+    if not all(half.any() for half in kept):
+        assert np.array_equal(separator, edge)
+        return
+    narrowest = width.sum()
+    for choice in product((0, 1, 2), repeat=int(band.sum())):
+        sides = [half.copy() for half in (*kept, np.zeros(n, dtype=bool))]
+        for k, half in enumerate(sides):
+            half[np.flatnonzero(band)[np.array(choice) == k]] = True
+        if not (graph.toarray()[np.ix_(sides[0], sides[1])] > 0).any():
+            narrowest = min(narrowest, width[sides[2]].sum())
+    assert width[separator].sum() == narrowest
 
 
 def test_a_separator_comes_last_and_parts_the_halves(monkeypatch: pytest.MonkeyPatch) -> None:

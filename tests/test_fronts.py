@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from beams import dense
@@ -14,7 +16,7 @@ import circuittex.mech.fronts as fronts
 from circuittex.design import plain_weave
 from circuittex.geometry.mesh import Ints
 from circuittex.geometry.weave import build_mesh
-from circuittex.mech.coupled import pair_of_entry
+from circuittex.mech.coupled import entries_of, pair_of_entry
 from circuittex.mech.dissection import minimum_degree
 from circuittex.mech.fronts import Analysis, Front
 from circuittex.mech.pattern import Pattern, build_pattern
@@ -34,7 +36,13 @@ def patterns(draw: st.DrawFn) -> Pattern:
 
 def analyse(pattern: Pattern) -> Analysis:
     """The fronts with all pairs of the pattern coupled."""
-    return fronts.analyse(pattern, pair_of_entry(pattern), np.ones(len(pattern.neighbour), dtype=bool))
+    return fronts.analyse(pattern, np.ones(len(pattern.neighbour), dtype=bool), np.arange(pattern.nnz))
+
+
+def merge_nothing(patch: pytest.MonkeyPatch) -> None:
+    """Fronts cost nothing, so that merging two of them never pays."""
+    patch.setattr(fronts, "FRONT", 0.0)
+    patch.setattr(fronts, "ADDITION", 0.0)
 
 
 def filled(pattern: Pattern, order: Ints) -> NDArray[np.bool_]:
@@ -62,7 +70,7 @@ def held(analysis: Analysis) -> NDArray[np.bool_]:
 @given(patterns())
 def test_unmerged_fronts_hold_the_fill_and_nothing_else(pattern: Pattern) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fronts, "FRONT", 0.0)
+        merge_nothing(patch)
         analysis = analyse(pattern)
     assert np.array_equal(held(analysis), filled(pattern, analysis.order))
 
@@ -83,6 +91,12 @@ def test_fronts_fit_together(pattern: Pattern, cost: float) -> None:
     for k, front in enumerate(analysis.fronts):
         own, border = pivots(front), front.border
         assert np.all(np.diff(np.append(own, border)) > 0)
+        for begin, end in pairwise(front.runs):
+            run = front.places[begin:end]
+            assert np.array_equal(run, run[0] + np.arange(end - begin))
+            inside = run < analysis.fronts[front.above].pivots
+            assert inside.all() or not inside.any()
+        assert [front.runs[0], front.runs[-1]] == ([0, len(border)] if len(border) else [0, 0])
         assert front.start == at
         for columns in (own, border):
             size = len(own) * len(columns)
@@ -110,15 +124,16 @@ def test_pairs_that_are_not_coupled_are_left_out(pattern: Pattern, seed: int) ->
     )
     full = pattern.full_offset >= 0
     smaller = build_pattern(pattern.n_dofs // 9, pairs[coupled & full], pairs[coupled & ~full])
-    found, expected = fronts.analyse(pattern, pair_of_entry(pattern), coupled), analyse(smaller)
+    entries = entries_of(pair_of_entry(pattern), coupled)
+    found, expected = fronts.analyse(pattern, coupled, entries), analyse(smaller)
     assert np.array_equal(found.order, expected.order)
     assert np.array_equal(found.target, expected.target)
-    assert np.array_equal(pattern.indices[found.entries], smaller.indices)
+    assert np.array_equal(pattern.indices[entries], smaller.indices)
 
 
 def test_a_fibril_has_no_fill(monkeypatch: pytest.MonkeyPatch) -> None:
     """A chain can be eliminated from its ends without fill, and minimum degree finds such an order."""
-    monkeypatch.setattr(fronts, "FRONT", 0.0)
+    merge_nothing(monkeypatch)
     chain = np.stack([np.arange(39), np.arange(1, 40)], axis=1)
     pattern = build_pattern(40, chain, NOTHING)
     assert held(analyse(pattern)).sum() == pattern.nnz
@@ -129,7 +144,7 @@ def test_the_order_spares_fill(monkeypatch: pytest.MonkeyPatch) -> None:
 
     And less than with whole nodes coupled across: directors couple along the fibril alone, and the parts show it.
     """
-    monkeypatch.setattr(fronts, "FRONT", 0.0)
+    merge_nothing(monkeypatch)
     node = np.arange(200).reshape(10, 20)
     along = np.stack([node[:, :-1].ravel(), node[:, 1:].ravel()], axis=1)
     pairs = [(node[:-1], node[1:]), (node[:-1, 1:], node[1:, :-1])]

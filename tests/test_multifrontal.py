@@ -109,9 +109,11 @@ def test_fronts_follow_the_coupled_pairs_and_are_kept_while_they_hold_them(monke
     """Contacts of one pattern that open, close again and multiply: every solution is right, few need new fronts."""
     analysed = []
 
-    def counting(pattern: Pattern, pair: Ints, coupled: NDArray[np.bool_]) -> fronts.Analysis:
+    def counting(
+        pattern: Pattern, coupled: NDArray[np.bool_], entries: Ints, last: fronts.Analysis | None
+    ) -> fronts.Analysis:
         analysed.append(int(coupled.sum()))
-        return fronts.analyse(pattern, pair, coupled)
+        return fronts.analyse(pattern, coupled, entries, last)
 
     monkeypatch.setattr(multifrontal, "analyse", counting)
     pattern, solver = grid(6), MultifrontalSolver()
@@ -128,13 +130,31 @@ def test_fronts_follow_the_coupled_pairs_and_are_kept_while_they_hold_them(monke
     assert analysed == [30 + 10, 30 + 30]  # thirty pairs along the fibrils
 
 
+def test_the_order_is_kept_while_it_serves() -> None:
+    """One pair more changes little; contact everywhere, where a third of it was, asks for another order."""
+    pattern, solver = grid(8), MultifrontalSolver()
+    pair, point = pair_of_entry(pattern), np.flatnonzero(pattern.full_offset < 0)
+    found = []
+    for closed in (20, 21, len(point)):
+        data = np.where(np.isin(pair, point[closed:]), 0.0, 1e-9)
+        data[diagonal(pattern)] = 1.0
+        assert solver.factor(pattern, data) is not None
+        assert solver._analysis is not None
+        found.append(solver._analysis)
+    assert np.array_equal(found[1].parts, found[0].parts)
+    assert found[1].least == found[0].least
+    assert not np.array_equal(found[2].parts, found[0].parts)
+    assert found[2].least > fronts.WORTHWHILE * found[0].least
+
+
 def test_one_front_is_the_dense_factor() -> None:
     """Everything in one front, against NumPy's Cholesky of the same matrix."""
     pattern = build_pattern(24, np.argwhere(np.triu(np.ones((24, 24)), 1)), np.empty((0, 2), dtype=np.int64))
     data = random_values(pattern, 3, 0.5)
     solver = solver_for(pattern, np.inf)
     assert solver.factor(pattern, data) is not None
-    ((triangle, border),) = solver._blocks
+    ((_, triangle, border),) = solver._blocks
+    assert solver._analysis is not None
     order = solver._analysis.order
     expected = np.linalg.cholesky(dense(pattern, data)[np.ix_(order, order)]).T
     assert np.abs(np.triu(triangle) - expected).max() < 1e-12 * np.abs(expected).max()

@@ -28,7 +28,7 @@ def contact_state(
     'current' (`axial_factor`).
     """
     space = beam_space(mesh)
-    term = PenaltyContact(mesh, space.slot, penalty=law.penalty, per_element=per_element)
+    term = PenaltyContact(mesh, penalty=law.penalty, per_element=per_element)
     touching, table = term.touching(space.vector(configuration)), term.table
     a, b = table.fibril[touching.interval_a], touching.fibril_b
     spacing = mesh.length / (np.diff(mesh.first_node) - 1)
@@ -72,7 +72,7 @@ def axial_factor(space: BeamSpace, configuration: Configuration) -> Floats:
     The conductance per reference length is sigma A_now / stretch with A_now = A |(g1 x g2).e| and
     stretch = |r'|; an element's is the harmonic mean over its line points, since they lie in series.
     """
-    x = space.vector(configuration).reshape(-1, 3, 3)[space.element_slots]
+    x = configuration.x[space.mesh.elements]
     slope = np.einsum("eqa,eac->eqc", space.slope, x[:, :, 0])
     g1, g2 = (np.einsum("qa,eac->eqc", space.shape, x[:, :, k]) for k in (1, 2))
     stretch = np.sqrt((slope**2).sum(axis=2))

@@ -43,7 +43,6 @@ def _couple(r: Any, wa: int, wb: int, c: Any, cs: Any, css: Any, w: Any, n: Any,
 @compiled
 def add_contacts(
     r: Any,
-    slot: Any,
     basis: Any,
     window_a: Any,
     kind_a: Any,
@@ -70,7 +69,7 @@ def add_contacts(
     stiffness (C,): P* times quadrature weight, N/mm; the matrix arguments are those of `Pattern`.
     """
     c, cs, css = np.zeros(8), np.zeros(8), np.zeros(8)
-    w, n, normal, turning = np.empty((8, 3)), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    w, n, spread, turned = np.empty((8, 3)), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     for q in range(overlap.shape[0]):
         weights(basis[kind_a[q]], t_a[q], 0, c[:4])
         for order, out in ((0, c), (1, cs), (2, css)):
@@ -79,33 +78,35 @@ def add_contacts(
                 out[i] = -out[i]
         d, over_m = _couple(r, window_a[q], window_b[q], c, cs, css, w, n, at_end[q])
         stiff, lean = stiffness[q], stiffness[q] * overlap[q] / d
+        for k in range(3):
+            for m in range(3):
+                spread[k, m] = stiff * n[k] * n[m]
+                turned[k, m] = lean * (n[k] * n[m] - (k == m))
+        over_m *= lean
+        # The lower window first: so the second node of each pair is the higher, a column right of the diagonal.
+        low, high = min(window_a[q], window_b[q]), max(window_a[q], window_b[q])
+        first, second = (0, 4) if low == window_a[q] else (4, 0)
         for i in range(8):
-            if c[i] == 0.0 and cs[i] == 0.0:
+            mine, node = (first + i, low + i) if i < 4 else (second + i - 4, high + i - 4)
+            if c[mine] == 0.0 and cs[mine] == 0.0:
                 continue
-            slot_i = slot[window_a[q] + i if i < 4 else window_b[q] + i - 4]
+            across = find_neighbour(start, neighbour, node, high) if i < 4 else 0
             for k in range(3):
-                total[9 * slot_i + k] -= stiff * overlap[q] * c[i] * n[k]
-            for j in range(i, 8):
-                if c[j] == 0.0 and cs[j] == 0.0:
+                total[9 * node + k] -= stiff * overlap[q] * c[mine] * n[k]
+                at = indptr[9 * node + k]
+                for m in range(k, 3):
+                    cc = c[mine] * c[mine]
+                    data[at + m - k] += cc * spread[k, m]
+                    softening[at + m - k] += cc * turned[k, m] + over_m * w[mine, k] * w[mine, m]
+            for j in range(i + 1, 8):
+                other = first + j if j < 4 else second + j - 4
+                if c[other] == 0.0 and cs[other] == 0.0:
                     continue
-                cc = c[i] * c[j]
+                # Neighbours rise: those in the same window come first, and those in the other lie side by side.
+                there = point_offset[across + j - 4 if i < 4 <= j else start[node] + j - i - 1]
+                cc = c[mine] * c[other]
                 for k in range(3):
+                    row, wk = indptr[9 * node + k] + 9 - k + there, over_m * w[mine, k]
                     for m in range(3):
-                        normal[k, m] = stiff * cc * n[k] * n[m]
-                        turning[k, m] = lean * (cc * n[k] * n[m] + over_m * w[i, k] * w[j, m])
-                    turning[k, k] -= lean * cc
-                if i == j:
-                    for k in range(3):
-                        at = indptr[9 * slot_i + k]
-                        for m in range(k, 3):
-                            data[at + m - k] += normal[k, m]
-                            softening[at + m - k] += turning[k, m]
-                    continue
-                slot_j = slot[window_a[q] + j if j < 4 else window_b[q] + j - 4]
-                low, high = min(slot_i, slot_j), max(slot_i, slot_j)
-                at = point_offset[find_neighbour(start, neighbour, low, high)]
-                for k in range(3):
-                    row = indptr[9 * low + k] + 9 - k + at
-                    for m in range(3):
-                        data[row + m] += normal[k, m]  # n n^T is its own transpose
-                        softening[row + m] += turning[k, m] if slot_i < slot_j else turning[m, k]
+                        data[row + m] += cc * spread[k, m]
+                        softening[row + m] += cc * turned[k, m] + wk * w[other, m]

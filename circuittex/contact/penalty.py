@@ -56,8 +56,8 @@ class PenaltyContact:
     candidates reach beyond touch so that they last several iterations.
     """
 
-    def __init__(self, mesh: FibrilMesh, slot: Ints, *, penalty: float, per_element: int, skin: float = 0.08) -> None:
-        self.mesh, self.slot, self.penalty, self.skin = mesh, slot, penalty, skin
+    def __init__(self, mesh: FibrilMesh, *, penalty: float, per_element: int, skin: float = 0.08) -> None:
+        self.mesh, self.penalty, self.skin = mesh, penalty, skin
         self.table: CurveTable = curve_table(mesh)
         self.points = contact_points(mesh, per_element)
         size = mesh.length / np.diff(mesh.first_element) / per_element
@@ -69,8 +69,8 @@ class PenaltyContact:
         self._last: tuple[Floats, Touching] | None = None
 
     def positions(self, q: Floats) -> Floats:
-        """(N, 3) centre-line nodes in mesh order."""
-        return np.ascontiguousarray(q.reshape(-1, 9)[self.slot, :3])
+        """(N, 3) centre-line nodes."""
+        return np.ascontiguousarray(q.reshape(-1, 9)[:, :3])
 
     def prepare(self, q: Floats) -> bool:
         """Renew the candidates once a Bézier point may have moved by half the skin."""
@@ -91,7 +91,7 @@ class PenaltyContact:
     def pairs(self) -> tuple[Ints, Ints]:
         """Node pairs that the present candidates can couple, positions only."""
         assert self._held is not None, "prepare comes first"
-        return np.empty((0, 2), dtype=np.int64), self.slot[coupled_nodes(self.table, self._held[0])]
+        return np.empty((0, 2), dtype=np.int64), coupled_nodes(self.table, self._held[0])
 
     def touching(self, q: Floats) -> Touching:
         """All contact points that overlap at q; candidates are searched for it if q lies outside their reach."""
@@ -117,7 +117,6 @@ class PenaltyContact:
         weight = self.weight[table.fibril[found.interval_a]]
         add_contacts(
             self.positions(q),
-            self.slot,
             BASIS,
             table.window[found.interval_a],
             table.kind[found.interval_a],

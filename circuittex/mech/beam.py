@@ -39,11 +39,7 @@ class Beam:
             unit, share = np.vstack([unit, [0.0, 0.0]]), np.append(share, 1.0)
         on_axis = np.arange(len(unit)) >= len(disk_rule(degree)[1])
         self.space = space
-        order = np.argsort(space.element_slots, axis=1)  # a row of the matrix begins with its own node
-        self.slots = np.take_along_axis(space.element_slots, order, axis=1)
-        by_line = order[:, None, :]
-        self.shape = np.take_along_axis(space.shape[None] * np.ones((len(fibril), 1, 1)), by_line, axis=2)
-        self.slope = np.take_along_axis(space.slope, by_line, axis=2)
+        self.nodes, self.shape, self.slope = mesh.elements, space.shape, space.slope
         self.mu = np.where(on_axis, 0.0, mu[fibril, None])
         self.lam = np.where(on_axis, (lam - lam_b)[fibril, None], lam_b[fibril, None])
         self.points = np.swapaxes(unit * mesh.radius[fibril, None, None], 1, 2).copy()
@@ -58,8 +54,8 @@ class Beam:
 
     def _strains(self, q: Floats) -> Floats:
         """(M, Q, 5, 3) g1, g2, r', g1', g2' at the line points."""
-        x = q.reshape(-1, 3, 3)[self.slots]
-        value, slope = (np.einsum("eqa,eapc->eqpc", table, x) for table in (self.shape, self.slope))
+        x = q.reshape(-1, 3, 3)[self.nodes]
+        value, slope = np.einsum("qa,eapc->eqpc", self.shape, x), np.einsum("eqa,eapc->eqpc", self.slope, x)
         return np.concatenate([value[:, :, 1:], slope], axis=2)
 
     def _quadratic(self) -> Floats:
@@ -78,7 +74,7 @@ class Beam:
 
     def _stiffness(self) -> Floats:
         """(M, 3 n, 3 n) the same integrated along each element for its nodal vectors r, g1, g2, N/mm."""
-        M, Q, n = self.shape.shape
+        M, Q, n = self.slope.shape
         to_strains = np.zeros((M, Q, n, 3, N_STRAINS))
         to_strains[..., 1, 0] = to_strains[..., 2, 1] = self.shape
         to_strains[..., 0, 2] = to_strains[..., 1, 3] = to_strains[..., 2, 4] = self.slope
@@ -91,13 +87,13 @@ class Beam:
 
     def pairs(self) -> tuple[Ints, Ints]:
         """All node pairs of each element, with all nine unknowns."""
-        n = self.slots.shape[1]
+        n = self.nodes.shape[1]
         i, j = np.triu_indices(n, 1)
-        full = self.slots[:, np.stack([i, j], axis=1)].reshape(-1, 2)
+        full = self.nodes[:, np.stack([i, j], axis=1)].reshape(-1, 2)
         return full, np.empty((0, 2), dtype=np.int64)
 
     def _arguments(self, q: Floats, weight: Floats) -> tuple[Any, ...]:
-        tables = self.slots, self.shape, self.slope, weight, self.points, self.natural, self.metric, self.mu, self.lam
+        tables = self.nodes, self.shape, self.slope, weight, self.points, self.natural, self.metric, self.mu, self.lam
         return q.reshape(-1, DOFS), *tables
 
     def _by_fibrils(self, kernel: Callable[..., object], *arguments: Any) -> None:
@@ -116,23 +112,19 @@ class Beam:
 
     def energy(self, q: Floats) -> float:
         """Elastic energy, N mm; infinite where a section has turned inside out."""
-        energy = np.empty(len(self.slots))
+        energy = np.empty(len(self.nodes))
         self._by_fibrils(beam_energy, *self._arguments(q, self.weight), energy)
         return float(energy.sum())
 
     def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
         """Add gradient and tangent in place, nothing to `softening`; return the energy."""
-        energy = np.empty(len(self.slots))
+        energy = np.empty(len(self.nodes))
         self._by_fibrils(
             add_tangent,
             *self._arguments(q, self.weight),
             self.stiffness,
             energy,
             pattern.indptr,
-            pattern.neighbour_start,
-            pattern.neighbour,
-            pattern.point_offset,
-            pattern.full_offset,
             gradient,
             data,
         )
@@ -147,7 +139,7 @@ class Beam:
     def mass(self, pattern: Pattern) -> Floats:
         """(nnz,) consistent mass matrix [34], rotary terms included: g for positions, g mm2 for directors."""
         mesh, fibril = self.space.mesh, self.space.mesh.element_fibril
-        n = self.space.element_slots.shape[1]
+        n = self.nodes.shape[1]
         line = (mesh.density * mesh.area)[fibril]
         inertia = np.stack([line, line * mesh.radius[fibril] ** 2 / 4, line * mesh.radius[fibril] ** 2 / 4], axis=1)
         matrix = np.zeros((len(fibril), n, DOFS, n, DOFS))
@@ -155,7 +147,7 @@ class Beam:
         matrix[:, :, k, :, k] = np.moveaxis(self.space.mass_line[..., None] * inertia[:, None, None, k // 3], -1, 0)
         data = np.zeros(pattern.nnz)
         add_elements(
-            self.space.element_slots,
+            self.nodes,
             matrix,
             pattern.indptr,
             pattern.neighbour_start,

@@ -34,11 +34,11 @@ class Coupled:
         if new:
             self._pattern, self.pair = pattern, pair_of_entry(pattern)
         pairs = np.zeros(len(pattern.neighbour), dtype=bool)
-        pairs[self.pair[(data != 0.0) & (self.pair >= 0)]] = True
+        _mark_pairs(self.pair, data, pairs)
         if not new and not np.any(pairs & ~self.pairs):
             return False
         self.pairs = pairs
-        self.entries = np.flatnonzero(np.append(pairs, True)[self.pair])
+        self.entries = entries_of(self.pair, pairs)
         return True
 
     def start(self) -> Ints:
@@ -52,6 +52,18 @@ def pair_of_entry(pattern: Pattern) -> Ints:
     pair = np.empty(pattern.nnz, dtype=np.int64)
     _fill_pairs(pattern.indptr, pattern.neighbour_start, pattern.full_offset >= 0, pair)
     return pair
+
+
+def entries_of(pair: Ints, pairs: NDArray[np.bool_]) -> Ints:
+    """Places of the entries of these pairs, and of those within a node; `pair` (nnz,) as `pair_of_entry` gives it."""
+    return np.flatnonzero(np.append(pairs, True)[pair])
+
+
+@compiled
+def _mark_pairs(pair: Any, data: Any, pairs: Any) -> None:
+    for k in range(pair.shape[0]):
+        if data[k] != 0.0 and pair[k] >= 0:
+            pairs[pair[k]] = True
 
 
 @compiled

@@ -11,11 +11,11 @@ import numpy as np
 import skfem
 
 from circuittex.frozen import frozen
-from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.material import bending_lambda, lame
 from circuittex.mech.section import disk_rule
-from circuittex.mech.space import beam_space, vector_basis
+from circuittex.mech.space import ALONG, DOFS, beam_space, vector_basis
 
 
 @frozen
@@ -79,7 +79,8 @@ class BeamForm:
 
     def __init__(self, mesh: FibrilMesh, *, degree: int = 7, natural: Configuration | None = None) -> None:
         self._basis = vector_basis(mesh)
-        self._natural = None if natural is None else self._basis.interpolate(beam_space(mesh).vector(natural))
+        self._place = _places(mesh, self._basis)
+        self._natural = None if natural is None else self._field(beam_space(mesh).vector(natural))
         self._points = [(p, *self._reference(p)) for p in section_points(mesh, degree)]
 
     def _reference(self, point: SectionPoint) -> tuple[Floats, Floats]:
@@ -89,13 +90,19 @@ class BeamForm:
         G = gradient_columns(self._natural, point)
         return _inverse_transposed(G).swapaxes(0, 1), point.area * _determinant(G)
 
+    def _field(self, q: Floats) -> Any:
+        """scikit-fem's field of the unknowns q (n_dofs,) at the line points."""
+        there = np.empty_like(q)
+        there[self._place] = q
+        return self._basis.interpolate(there)
+
     def energy(self, q: Floats) -> float:
         """∫∫ psi dA dxi3, N mm, for q (n_dofs,)."""
 
         def form(w: Any) -> Any:
             return sum(area * psi(_product(gradient_columns(w.x0, p), G), p.mu, p.lam) for p, G, area in self._points)
 
-        return float(skfem.Functional(form).assemble(self._basis, x0=self._basis.interpolate(q)))
+        return float(skfem.Functional(form).assemble(self._basis, x0=self._field(q)))
 
     def residual(self, q: Floats) -> Floats:
         """(n_dofs,) ∫∫ P : dF(v) dA dxi3 for every test function v [35], N."""
@@ -107,7 +114,7 @@ class BeamForm:
                 total = total + area * np.einsum("ij...,ij...", stress(F, p.mu, p.lam), dF)
             return total
 
-        return np.asarray(skfem.LinearForm(form).assemble(self._basis, x0=self._basis.interpolate(q)))
+        return np.asarray(skfem.LinearForm(form).assemble(self._basis, x0=self._field(q)))[self._place]
 
     def tangent(self, q: Floats) -> Any:
         """(n_dofs, n_dofs) sparse matrix ∫∫ dP(u) : dF(v) dA dxi3, N/mm."""
@@ -119,7 +126,15 @@ class BeamForm:
                 total = total + area * np.einsum("ij...,ij...", stress_change(F, dU, p.mu, p.lam), dV)
             return total
 
-        return skfem.BilinearForm(form).assemble(self._basis, x0=self._basis.interpolate(q))
+        matrix = skfem.BilinearForm(form).assemble(self._basis, x0=self._field(q))
+        return matrix.tocsr()[self._place][:, self._place]
+
+
+def _places(mesh: FibrilMesh, basis: Any) -> Ints:
+    """(n_dofs,) where scikit-fem, which numbers the middle nodes of elements last, has each of the unknowns."""
+    node = np.empty(mesh.n_nodes, dtype=np.int64)
+    node[mesh.elements] = np.asarray(basis.element_dofs)[::DOFS].T[:, ALONG[mesh.order]] // DOFS
+    return np.asarray((DOFS * node[:, None] + np.arange(DOFS)).ravel())
 
 
 def _product(A: Floats, B: Floats) -> Floats:

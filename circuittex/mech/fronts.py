@@ -11,7 +11,7 @@ the position of node a, part 2 a + 1 its directors.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,9 +26,12 @@ from circuittex.mech.space import DOFS
 
 POSITION = 3
 """Unknowns of a node's position; the others are its directors'."""
-FRONT = 1e6
-"""What a front costs besides its elimination, in floating-point operations: two become one where that adds fewer. A
-tenth of it makes the factor an eighth smaller and the factorisation a tenth slower."""
+WORTHWHILE = 1.2
+"""Parts are dissected anew where their last order takes this times the operations that it took when it was made, since
+pairs have come to be coupled across its separators."""
+FRONT, ADDITION = 1e6, 10.0
+"""What a front costs besides its elimination, in floating-point operations: in any case, and for each value that it
+hands to the front above. Two become one where that adds fewer."""
 
 
 @frozen
@@ -47,6 +50,8 @@ class Front:
     """number of the front above; -1 where there is no border."""
     places: Ints
     """(b,) where those of the border are in the front above, its pivots first."""
+    runs: Ints
+    """where in `places` runs of successive ones begin, none of them of pivots and others; and, last, b."""
 
 
 @frozen
@@ -57,24 +62,51 @@ class Analysis:
     """(n_dofs,) unknowns in the order of elimination."""
     fronts: tuple[Front, ...]
     """in the order of elimination: each comes after those below it."""
-    entries: Ints
-    """the pattern's entries that belong to the fronts; the others are zero."""
     target: Ints
-    """where in the factor each of them belongs."""
+    """where in the factor each of the entries belongs."""
     size: int
     """values in the factor."""
+    parts: Ints
+    """the parts by their turns, as dissection gave them."""
+    least: float
+    """floating-point operations that a factorisation took when the parts were dissected."""
 
 
-def analyse(pattern: Pattern, pair: Ints, coupled: NDArray[np.bool_]) -> Analysis:
+class _Tree(NamedTuple):
+    """Fronts as sets of parts, the latter numbered by their turns."""
+
+    parts: Ints
+    """the part of each turn."""
+    begin: Ints
+    """where in `later` those of each part begin."""
+    later: Ints
+    """the later parts to which each is coupled when its turn comes."""
+    tops: Ints
+    """the part that gives each front its border."""
+    front: Ints
+    """the front of each part."""
+    operations: float
+    """floating-point operations of a factorisation."""
+
+
+def analyse(pattern: Pattern, coupled: NDArray[np.bool_], entries: Ints, last: Analysis | None = None) -> Analysis:
     """The order of elimination and the fronts of a matrix in which some node pairs are coupled, the others not.
 
-    `pair` (nnz,) is what `circuittex.mech.coupled.pair_of_entry` gives, `coupled` tells of each pair whether it counts.
+    `coupled` tells of each pair of the pattern whether it counts, `entries` are the places of the entries that do
+    (`circuittex.mech.coupled`). Parts take turns as in the `last` analysis, if there is one, while that serves; else
+    they are dissected anew.
     """
-    n, graph = pattern.n_dofs, _graph(pattern, coupled)
+    graph = _graph(pattern, coupled)
     width = np.tile([POSITION, DOFS - POSITION], graph.shape[0] // 2)
-    parts = dissect(graph, width, pattern.position.repeat(2, axis=0))
-    begin, later = _borders(graph, parts)
-    tops, front_of_turn = _merge(begin, later, width[parts])
+    tree = None
+    if last is not None and len(last.parts) == len(width):
+        tree, least = _tree(graph, width, last.parts), last.least
+        if tree.operations > WORTHWHILE * least:
+            tree = None
+    if tree is None:
+        tree = _tree(graph, width, dissect(graph, width, pattern.position.repeat(2, axis=0)))
+        least = tree.operations
+    parts, begin, later, tops, front_of_turn = tree.parts, tree.begin, tree.later, tree.tops, tree.front
 
     # Parts by their fronts, then their unknowns: the order of elimination.
     by_front = np.argsort(front_of_turn, kind="stable")
@@ -98,6 +130,10 @@ def analyse(pattern: Pattern, pair: Ints, coupled: NDArray[np.bool_]) -> Analysi
     above[b > 0] = front_of[border[cut[:-1][b > 0]]]
     places = np.empty(len(border), dtype=np.int64)
     _find(above[owner], border, first, p, cut, border, places)
+    breaks = (np.diff(places, prepend=-2) != 1) | (places == p[above[owner]])
+    breaks[cut[:-1][b > 0]] = True
+    runs = np.flatnonzero(breaks)
+    run_cut = np.searchsorted(runs, cut)
     size = p * (p + b)
     start = np.cumsum(size) - size
     fronts = tuple(
@@ -108,20 +144,13 @@ def analyse(pattern: Pattern, pair: Ints, coupled: NDArray[np.bool_]) -> Analysi
             start=int(start[k]),
             above=int(above[k]),
             places=places[cut[k] : cut[k + 1]],
+            runs=np.append(runs[run_cut[k] : run_cut[k + 1]], cut[k + 1]) - cut[k],
         )
         for k in range(len(p))
     )
-
-    entries = np.flatnonzero(np.append(coupled, True)[pair])  # pair -1 takes the last: True
-    i = place[np.repeat(np.arange(n), np.diff(pattern.indptr))[entries]]
-    j = place[pattern.indices[entries]]
-    row, column = np.minimum(i, j), np.maximum(i, j)
-    front = front_of[row]
     target = np.empty(len(entries), dtype=np.int64)
-    _find(front, column, first, p, cut, border, target)
-    row, triangle = row - first[front], p[front]
-    inside = np.where(target < triangle, row * triangle + target, triangle**2 + row * b[front] + target - triangle)
-    return Analysis(order=order, fronts=fronts, entries=entries, target=start[front] + inside, size=int(size.sum()))
+    _locate(entries, pattern.indptr, pattern.indices, place, front_of, first, p, cut, border, start, target)
+    return Analysis(order=order, fronts=fronts, target=target, size=int(size.sum()), parts=tree.parts, least=least)
 
 
 @compiled
@@ -132,6 +161,45 @@ def _find(front: Any, unknown: Any, first: Any, pivots: Any, cut: Any, border: A
         found[k] = unknown[k] - first[f]
         if found[k] >= pivots[f]:
             found[k] = pivots[f] + np.searchsorted(border[cut[f] : cut[f + 1]], unknown[k])
+
+
+@compiled
+def _locate(
+    entries: Any,
+    indptr: Any,
+    indices: Any,
+    place: Any,
+    front_of: Any,
+    first: Any,
+    pivots: Any,
+    cut: Any,
+    border: Any,
+    start: Any,
+    target: Any,
+) -> None:
+    """Fill target with where the entries of the matrix belong in the factor.
+
+    What comes next in a row is mostly the next unknown in the same front, or of the same unknown.
+    """
+    row, f, column, at = 0, -1, -1, -1
+    for k in range(entries.shape[0]):
+        while entries[k] >= indptr[row + 1]:
+            row += 1
+        i, j = place[row], place[indices[entries[k]]]
+        i, j = min(i, j), max(i, j)
+        if front_of[i] != f or j != column:
+            next_one = front_of[i] == f and j == column + 1 and at + 1 >= pivots[f]
+            f, column = front_of[i], j
+            own = cut[f] - pivots[f]  # where in `border` the first pivot would be
+            if j - first[f] < pivots[f]:
+                at = j - first[f]
+            elif next_one and own + at + 1 < cut[f + 1] and border[own + at + 1] == j:
+                at += 1
+            else:
+                at = pivots[f] + np.searchsorted(border[cut[f] : cut[f + 1]], j)
+        p, r = pivots[f], i - first[f]
+        wide = cut[f + 1] - cut[f]
+        target[k] = start[f] + (r * p + at if at < p else p * p + r * wide + at - p)
 
 
 def _graph(pattern: Pattern, coupled: NDArray[np.bool_]) -> sp.csr_array:
@@ -147,15 +215,22 @@ def _graph(pattern: Pattern, coupled: NDArray[np.bool_]) -> sp.csr_array:
     return sp.csr_array((np.ones(2 * len(i)), ends), shape=(2 * n, 2 * n))
 
 
-def _borders(graph: sp.csr_array, order: Ints) -> tuple[Ints, Ints]:
-    """For each part the later ones to which it is coupled when its turn comes; parts are numbered by their turns.
-
-    Returns where those of each part begin, and all of them.
-    """
-    turned = graph[order][:, order]
-    begin = np.zeros(len(order) + 1, dtype=np.int64)
+def _tree(graph: sp.csr_array, width: Ints, parts: Ints) -> _Tree:
+    """The fronts that make the least work of the parts in this order."""
+    turned = graph[parts][:, parts]
+    n, width = len(parts), width[parts]
+    begin = np.zeros(n + 1, dtype=np.int64)
     later = _eliminate(turned.indptr.astype(np.int64), turned.indices.astype(np.int64), begin)
-    return begin, later
+    some = np.diff(begin) > 0
+    above = np.full(n, -1)
+    above[some] = np.minimum.reduceat(later, begin[:-1][some])
+    p, b = width.astype(float), np.diff(np.concatenate([[0], np.cumsum(width[later])])[begin]).astype(float)
+    taken, tops = _take_in(above, p, b, FRONT, ADDITION)
+    front = np.empty(n, dtype=np.int64)
+    front[tops] = np.arange(len(tops))
+    for c in np.flatnonzero(taken != np.arange(n))[::-1]:  # what takes a part in comes after it
+        front[c] = front[taken[c]]
+    return _Tree(parts, begin, later, tops, front, float(_work(p[tops], b[tops]).sum()))
 
 
 @compiled
@@ -188,47 +263,60 @@ def _eliminate(indptr: Any, indices: Any, begin: Any) -> Any:
     return later[:end]
 
 
-def _merge(begin: Ints, later: Ints, width: Ints) -> tuple[Ints, Ints]:
-    """The part that gives each front its border, and the front of each part.
+@compiled
+def _take_in(above: Any, p: Any, b: Any, front: float, addition: float) -> Any:
+    """Which part takes each part in, itself where none does, and all those in an order of elimination.
 
     At first every part is a front. Each takes in those below it while that saves time, the largest first, and those
     below a front come just before it, which keeps few of them waiting.
     """
-    n = len(width)
-    some = np.diff(begin) > 0
-    above = np.full(n, -1)
-    above[some] = np.minimum.reduceat(later, begin[:-1][some])
-    total = np.concatenate([[0], np.cumsum(width[later])])
-    p, b = width.tolist(), np.diff(total[begin]).tolist()
-    below: list[list[int]] = [[] for _ in range(n)]
-    taken = list(range(n))
-    for k, up in enumerate(above.tolist()):
-        kept = []
-        for c in sorted(below[k], key=lambda c: -b[c]):
-            if _work(p[k] + p[c], b[k]) < _work(p[k], b[k]) + _work(p[c], b[c]) + FRONT:
+    n = above.shape[0]
+    taken, below = np.arange(n), np.empty(n, np.int64)
+    head, tail, sibling = np.full(n, -1), np.full(n, -1), np.full(n, -1)  # lists of those below
+    for k in range(n):
+        count, c = 0, head[k]
+        while c >= 0:
+            at = count
+            while at > 0 and b[below[at - 1]] < b[c]:
+                below[at] = below[at - 1]
+                at -= 1
+            below[at], count, c = c, count + 1, sibling[c]
+        head[k] = tail[k] = -1
+        for m in range(count):
+            c = below[m]
+            first, last, sibling[c] = c, c, -1
+            apart = _work(p[k], b[k]) + _work(p[c], b[c]) + front + addition * b[c] ** 2
+            if _work(p[k] + p[c], b[k]) < apart:
+                taken[c], first, last = k, head[c], tail[c]
                 p[k] += p[c]
-                taken[c] = k
-                kept += below[c]
-            else:
-                kept.append(c)
-        below[k] = kept
+            if first >= 0:
+                if head[k] < 0:
+                    head[k] = first
+                else:
+                    sibling[tail[k]] = first
+                tail[k] = last
+        up = above[k]
         if up >= 0:
-            below[up].append(k)
-    backwards: list[int] = []
-    waiting = np.flatnonzero(~some).tolist()
-    waiting = [k for k in waiting if taken[k] == k]
-    while waiting:
-        k = waiting.pop()
-        backwards.append(k)
-        waiting += below[k]
-    tops = np.array(backwards[::-1])
-    front = np.empty(n, dtype=np.int64)
-    front[tops] = np.arange(len(tops))
-    for c in range(n - 1, -1, -1):  # what takes a part in comes after it
-        front[c] = front[taken[c]]
-    return tops, front
+            if head[up] < 0:
+                head[up] = k
+            else:
+                sibling[tail[up]] = k
+            tail[up] = k
+    order, end, waiting = np.empty(n, np.int64), n, 0
+    for k in range(n):
+        if above[k] < 0:
+            below[waiting], waiting = k, waiting + 1
+    while waiting > 0:
+        waiting -= 1
+        k = below[waiting]
+        end -= 1
+        order[end], c = k, head[k]
+        while c >= 0:
+            below[waiting], waiting, c = c, waiting + 1, sibling[c]
+    return taken, order[end:]
 
 
-def _work(p: int, b: int) -> float:
+@compiled
+def _work(p: Any, b: Any) -> Any:
     """Operations that eliminate p unknowns of p + b: one multiplication and addition for each entry and pivot."""
     return ((p + b) ** 3 - b**3) / 3

@@ -28,17 +28,17 @@ SERIES = 12
 
 
 @compiled
-def strains(slots: Any, x: Any, shape: Any, slope: Any, u: Any, normal: Any) -> None:
-    """Fill u (5, 3) with (g1, g2, r', g1', g2') from the nodal values x (slots, 9), and normal (3,) with g1 x g2."""
+def strains(nodes: Any, x: Any, shape: Any, slope: Any, u: Any, normal: Any) -> None:
+    """Fill u (5, 3) with (g1, g2, r', g1', g2') from the nodal values x (N, 9), and normal (3,) with g1 x g2."""
     u[:] = 0.0
-    for a in range(slots.shape[0]):
-        slot = slots[a]
+    for a in range(nodes.shape[0]):
+        node = nodes[a]
         for c in range(3):
-            u[0, c] += shape[a] * x[slot, 3 + c]
-            u[1, c] += shape[a] * x[slot, 6 + c]
-            u[2, c] += slope[a] * x[slot, c]
-            u[3, c] += slope[a] * x[slot, 3 + c]
-            u[4, c] += slope[a] * x[slot, 6 + c]
+            u[0, c] += shape[a] * x[node, 3 + c]
+            u[1, c] += shape[a] * x[node, 6 + c]
+            u[2, c] += slope[a] * x[node, c]
+            u[3, c] += slope[a] * x[node, 3 + c]
+            u[4, c] += slope[a] * x[node, 6 + c]
     for c in range(3):
         c1, c2 = (c + 1) % 3, (c + 2) % 3
         normal[c] = u[0, c1] * u[1, c2] - u[0, c2] * u[1, c1]
@@ -208,7 +208,7 @@ def beam_energy(
     first: int,
     last: int,
     x: Any,
-    slots: Any,
+    nodes: Any,
     shape: Any,
     slope: Any,
     weight: Any,
@@ -221,7 +221,7 @@ def beam_energy(
 ) -> None:
     """Fill out (M,) with the elastic energy, N mm, of elements first to last; infinite where one is inside out.
 
-    x (slots, 9); slots (M, n); shape, slope (M, Q, n); weight (M, Q, S) volumes; points (1 or M, 2, S); natural
+    x (N, 9); nodes (M, n); shape (Q, n); slope (M, Q, n); weight (M, Q, S) volumes; points (1 or M, 2, S); natural
     (1 or M, Q, 5, 5); metric (1, Q, 0, 3, 3) or (M, Q, S, 3, 3); mu, lam (M, S).
     """
     u, normal, j, work = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, weight.shape[2]))
@@ -229,8 +229,8 @@ def beam_energy(
     for e in range(first, last):
         block, shaped = min(e, points.shape[0] - 1), min(e, natural.shape[0] - 1)
         out[e] = 0.0
-        for q in range(shape.shape[1]):
-            strains(slots[e], x, shape[e, q], slope[e, q], u, normal)
+        for q in range(shape.shape[0]):
+            strains(nodes[e], x, shape[q], slope[e, q], u, normal)
             if section(u, normal, natural[shaped, q], metric[shaped, q], points[block], d, j, work):
                 out[e] += energy(weight[e, q], mu[e], lam[e], work)
             else:
@@ -242,7 +242,7 @@ def section_force(
     first: int,
     last: int,
     x: Any,
-    slots: Any,
+    nodes: Any,
     shape: Any,
     slope: Any,
     area: Any,
@@ -262,8 +262,8 @@ def section_force(
     d, p, A = np.empty((N_STRAINS, N_STRAINS)), np.empty(3), np.empty((3, 3))
     for e in range(first, last):
         block, shaped = min(e, points.shape[0] - 1), min(e, natural.shape[0] - 1)
-        for q in range(shape.shape[1]):
-            strains(slots[e], x, shape[e, q], slope[e, q], u, normal)
+        for q in range(shape.shape[0]):
+            strains(nodes[e], x, shape[q], slope[e, q], u, normal)
             section(u, normal, natural[shaped, q], metric[shaped, q], points[block], d, j, work)
             moments(area[e, q], points[block], mu[e], lam[e], work, p, A)
             for c in range(3):

@@ -19,7 +19,7 @@ from circuittex.mech.space import DOFS
 
 @frozen
 class Pattern:
-    """Upper triangular CSR pattern over n slots of nine unknowns each."""
+    """Upper triangular CSR pattern over n nodes of nine unknowns each."""
 
     indptr: Ints
     """(9 n + 1,) row starts."""
@@ -28,13 +28,13 @@ class Pattern:
     neighbour_start: Ints
     """(n + 1,) offsets into `neighbour`."""
     neighbour: Ints
-    """neighbours b > a of each slot a, sorted."""
+    """neighbours b > a of each node a, sorted."""
     point_offset: Ints
     """per neighbour: where its columns start in the rows of a's position, after a's own diagonal block."""
     full_offset: Ints
     """per neighbour: the same in the rows of a's directors; -1 for a point pair."""
     position: Floats
-    """(n, 3) where the slots are, mm, by and large: a hint for orders of elimination."""
+    """(n, 3) where the nodes are, mm, by and large: a hint for orders of elimination."""
 
     @property
     def n_dofs(self) -> int:
@@ -46,9 +46,9 @@ class Pattern:
 
 
 def build_pattern(n: int, full: Ints, point: Ints, position: Floats | None = None) -> Pattern:
-    """The pattern of `n` slots with `full` (P, 2) and `point` (P', 2) node pairs, in any order, repeats allowed.
+    """The pattern of `n` nodes with `full` (P, 2) and `point` (P', 2) node pairs, in any order, repeats allowed.
 
-    `position` (n, 3) tells where the slots are, mm; without it they are all in one place.
+    `position` (n, 3) tells where the nodes are, mm; without it they are all in one place.
     """
     full_key = _keys(n, full)
     key = distinct(np.concatenate([full_key, _keys(n, point)]))
@@ -97,13 +97,13 @@ def ranges(first: Ints, length: Ints) -> Ints:
 
 
 def _keys(n: int, pairs: Ints) -> Ints:
-    """One number for each pair of different slots, the lower slot first."""
+    """One number for each pair of different nodes, the lower node first."""
     low, high = np.minimum(pairs[:, 0], pairs[:, 1]), np.maximum(pairs[:, 0], pairs[:, 1])
     return (low * n + high)[low < high]
 
 
 def _offsets(width: Ints, start: Ints) -> Ints:
-    """Exclusive running sum of `width`, restarted at each slot."""
+    """Exclusive running sum of `width`, restarted at each node."""
     total = np.concatenate([[0], np.cumsum(width)])
     return total[:-1] - np.repeat(total[start[:-1]], np.diff(start))
 
@@ -125,7 +125,7 @@ def _fill_indices(indptr: Any, start: Any, neighbour: Any, full: Any, indices: A
 
 @compiled
 def find_neighbour(start: Any, neighbour: Any, a: int, b: int) -> int:
-    """Index of slot b among the neighbours of slot a < b, by bisection."""
+    """Index of node b among the neighbours of node a < b, by bisection."""
     low, high = start[a], start[a + 1]
     while high - low > 1:
         middle = (low + high) // 2
@@ -138,7 +138,7 @@ def find_neighbour(start: Any, neighbour: Any, a: int, b: int) -> int:
 
 @compiled
 def add_elements(
-    slots: Any,
+    nodes: Any,
     matrix: Any,
     indptr: Any,
     start: Any,
@@ -148,16 +148,15 @@ def add_elements(
     data: Any,
 ) -> None:
     """Add symmetric element matrices (M, n, 9, n, 9) to the matrix values."""
-    nodes = slots.shape[1]
-    for e in range(slots.shape[0]):
-        for i in range(nodes):
-            a = slots[e, i]
+    for e in range(nodes.shape[0]):
+        for i in range(nodes.shape[1]):
+            a = nodes[e, i]
             for k in range(9):
                 at = indptr[9 * a + k]
                 for m in range(k, 9):
                     data[at + m - k] += matrix[e, i, k, i, m]
-            for j in range(i + 1, nodes):
-                b = slots[e, j]
+            for j in range(i + 1, nodes.shape[1]):
+                b = nodes[e, j]
                 low, high = min(a, b), max(a, b)
                 n = find_neighbour(start, neighbour, low, high)
                 for k in range(9):

@@ -1,4 +1,4 @@
-"""The finite element space of the beams: scikit-fem's mesh, basis, quadrature and dof numbering."""
+"""The finite element space of the beams: scikit-fem's mesh, basis and quadrature."""
 
 from __future__ import annotations
 
@@ -14,21 +14,18 @@ from circuittex.mech.configuration import Configuration
 
 DOFS = 9
 """Unknowns of a node: r, g1, g2."""
+ALONG = {1: [0, 1], 2: [0, 2, 1]}
+"""scikit-fem's numbers of the nodes along an element, for each order: a middle node is its last."""
 
 
 @frozen
 class BeamSpace:
     """What the beam kernels need of scikit-fem's basis; M elements of n nodes, Q line points.
 
-    Unknowns are numbered by scikit-fem. The nine of one node are contiguous, so its number there, its
-    *slot*, says it all: unknown k of node i is ``9 * slot[i] + k``.
+    Unknown k of node i is ``9 * i + k``. Nodes are numbered along their fibrils: an element has successive ones.
     """
 
     mesh: FibrilMesh
-    slot: Ints
-    """(N,) scikit-fem's number of each node."""
-    element_slots: Ints
-    """(M, n) slots of each element's nodes, in axis order."""
     shape: Floats
     """(Q, n) shape functions at the line points."""
     slope: Floats
@@ -45,14 +42,12 @@ class BeamSpace:
         return DOFS * self.mesh.n_nodes
 
     def vector(self, configuration: Configuration) -> Floats:
-        """(n_dofs,) unknowns of a configuration, in scikit-fem's numbering."""
-        q = np.empty((self.mesh.n_nodes, DOFS))
-        q[self.slot] = configuration.x.reshape(-1, DOFS)
-        return q.ravel()
+        """(n_dofs,) unknowns of a configuration."""
+        return configuration.x.flatten()
 
     def configuration(self, vector: Floats) -> Configuration:
         """The configuration that a vector of unknowns describes."""
-        return Configuration(vector.reshape(-1, 3, 3)[self.slot])
+        return Configuration(vector.reshape(-1, 3, 3))
 
 
 def line_mesh(mesh: FibrilMesh) -> Any:
@@ -82,28 +77,22 @@ def beam_space(mesh: FibrilMesh, free: str = "") -> BeamSpace:
     basis = vector_basis(mesh)
     scalar = skfem.Basis(basis.mesh, type(basis.elem.elem)(), quadrature=gauss(mesh.order))
     exact = skfem.Basis(basis.mesh, type(basis.elem.elem)(), quadrature=gauss(mesh.order + 1))
-    axis_order = [0, 1] if mesh.order == 1 else [0, 2, 1]  # scikit-fem numbers the middle node last
 
     def tables(of: Any) -> tuple[Floats, Floats]:
-        value = np.stack([np.broadcast_to(np.asarray(of.basis[i][0]), of.dx.shape) for i in axis_order], axis=-1)
-        grad = np.stack([of.basis[i][0].grad[0] for i in axis_order], axis=-1)
+        value = np.stack([np.broadcast_to(np.asarray(of.basis[i][0]), of.dx.shape) for i in ALONG[mesh.order]], axis=-1)
+        grad = np.stack([of.basis[i][0].grad[0] for i in ALONG[mesh.order]], axis=-1)
         return value, grad
 
     shape, slope = tables(scalar)
     exact_shape, _ = tables(exact)
-    local = np.asarray(basis.element_dofs)[::DOFS].T[:, axis_order] // DOFS
-    slot = np.empty(mesh.n_nodes, dtype=np.int64)
-    slot[mesh.elements] = local
     axis = ("x", "y", "").index(one_of(free, "free", ("x", "y", "")))
     held = mesh.yarn_axis[mesh.yarn] != axis
     ends = np.concatenate([mesh.end_nodes(-1)[held], mesh.end_nodes(+1)[held]])
     return BeamSpace(
         mesh=mesh,
-        slot=slot,
-        element_slots=slot[mesh.elements],
         shape=shape[0],
         slope=slope,
         weight=np.asarray(scalar.dx),
         mass_line=np.einsum("mqa,mqb,mq->mab", exact_shape, exact_shape, exact.dx),
-        fixed=np.sort((DOFS * slot[ends][:, None] + np.arange(3)).ravel()),
+        fixed=np.sort((DOFS * ends[:, None] + np.arange(3)).ravel()),
     )

@@ -15,7 +15,6 @@ import numpy as np
 
 from circuittex.compiled import compiled
 from circuittex.mech.kernels import N_STRAINS, energy, moments, section, strains
-from circuittex.mech.pattern import find_neighbour
 
 WIDTH = 32
 """Length of a row of the 27 unknowns of a quadratic element, filled up."""
@@ -96,40 +95,34 @@ def _products(V: Any, W: Any, K: Any) -> None:
 
 
 @compiled
-def _add_gradient(slots: Any, x: Any, stiffness: Any, g: Any, total: Any) -> None:
+def _add_gradient(nodes: Any, x: Any, stiffness: Any, g: Any, total: Any) -> None:
     """Add the element's gradient, that of the constant stiffness (3 n, 3 n) included, to total (n_dofs,)."""
     for k in range(stiffness.shape[0]):
         t0, t1, t2 = g[3 * k], g[3 * k + 1], g[3 * k + 2]
-        for j in range(slots.shape[0]):
-            row = x[slots[j]]
+        for j in range(nodes.shape[0]):
+            row = x[nodes[j]]
             for m in range(3):
                 factor = stiffness[k, 3 * j + m]
                 t0 += factor * row[3 * m]
                 t1 += factor * row[3 * m + 1]
                 t2 += factor * row[3 * m + 2]
-        at = 9 * slots[k // 3] + 3 * (k % 3)
+        at = 9 * nodes[k // 3] + 3 * (k % 3)
         total[at] += t0
         total[at + 1] += t1
         total[at + 2] += t2
 
 
 @compiled
-def _add_tangent(
-    slots: Any, K: Any, indptr: Any, start: Any, neighbour: Any, point_offset: Any, full_offset: Any, data: Any
-) -> None:
-    """Add the upper triangle of the element's tangent K (9 n, WIDTH) to the matrix values."""
-    for i in range(slots.shape[0]):
-        for r in range(9):
-            at, row = indptr[9 * slots[i] + r] - r, K[9 * i + r]
-            for m in range(r, 9):
-                data[at + m] += row[9 * i + m]
-        for j in range(i + 1, slots.shape[0]):
-            n = find_neighbour(start, neighbour, slots[i], slots[j])
-            for r in range(9):
-                at, row = indptr[9 * slots[i] + r] + 9 - r, K[9 * i + r]
-                at += point_offset[n] if r < 3 else full_offset[n]
-                for m in range(9):
-                    data[at + m] += row[9 * j + m]
+def _add_tangent(nodes: Any, K: Any, indptr: Any, data: Any) -> None:
+    """Add the upper triangle of the element's tangent K (9 n, WIDTH) to the matrix values.
+
+    The nodes follow one another, and a row of the matrix begins with them: with its own and its first neighbours.
+    """
+    width = 9 * nodes.shape[0]
+    for r in range(width):
+        at, row = indptr[9 * nodes[0] + r] - r, K[r]
+        for m in range(r, width):
+            data[at + m] += row[m]
 
 
 @compiled
@@ -137,7 +130,7 @@ def add_tangent(
     first: int,
     last: int,
     x: Any,
-    slots: Any,
+    nodes: Any,
     shape: Any,
     slope: Any,
     weight: Any,
@@ -149,16 +142,12 @@ def add_tangent(
     stiffness: Any,
     out: Any,
     indptr: Any,
-    start: Any,
-    neighbour: Any,
-    point_offset: Any,
-    full_offset: Any,
     total: Any,
     data: Any,
 ) -> None:
     """Add gradient (n_dofs,), N, and tangent (nnz,), N/mm, of elements first to last; fill out (M,) with energies.
 
-    Arguments as `beam_energy`, the slots of an element in ascending order; stiffness (M, 3 n, 3 n).
+    Arguments as `beam_energy`, the nodes of an element one after another; stiffness (M, 3 n, 3 n).
     """
     u, normal, j, work = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, weight.shape[2]))
     d, p, A = np.empty((N_STRAINS, N_STRAINS)), np.empty(3), np.empty((3, 3))
@@ -168,18 +157,18 @@ def add_tangent(
     for e in range(first, last):
         block, shaped = min(e, points.shape[0] - 1), min(e, natural.shape[0] - 1)
         out[e], g[:], C[:] = 0.0, 0.0, 0.0
-        for q in range(shape.shape[1]):
-            strains(slots[e], x, shape[e, q], slope[e, q], u, normal)
+        for q in range(shape.shape[0]):
+            strains(nodes[e], x, shape[q], slope[e, q], u, normal)
             if not section(u, normal, natural[shaped, q], metric[shaped, q], points[block], d, j, work):
                 out[e] = np.inf
                 continue
             out[e] += energy(weight[e, q], mu[e], lam[e], work)
             moments(weight[e, q], points[block], mu[e], lam[e], work, p, A)
             here = slice(3 * q, 3 * q + 3)
-            _volume_slopes(u, normal, shape[e, q], slope[e, q], V[here])
+            _volume_slopes(u, normal, shape[q], slope[e, q], V[here])
             _weighted(p, A, V[here], W[here], g)
-            _turn(u, shape[e, q], slope[e, q], p, C)
+            _turn(u, shape[q], slope[e, q], p, C)
         _spread(stiffness[e], C, K)
         _products(V, W, K)
-        _add_gradient(slots[e], x, stiffness[e], g, total)
-        _add_tangent(slots[e], K, indptr, start, neighbour, point_offset, full_offset, data)
+        _add_gradient(nodes[e], x, stiffness[e], g, total)
+        _add_tangent(nodes[e], K, indptr, data)

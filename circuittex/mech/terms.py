@@ -15,7 +15,7 @@ class ForceTerm(Protocol):
         """Make the term valid around q; True if the node pairs it couples have changed."""
 
     def pairs(self) -> tuple[Ints, Ints]:
-        """Coupled slots: full pairs (P, 2) with all nine unknowns, point pairs (P', 2) with the positions."""
+        """Coupled nodes: full pairs (P, 2) with all nine unknowns, point pairs (P', 2) with the positions."""
 
     def energy(self, q: Floats) -> float:
         """The potential, N mm; infinite where q is impossible."""

@@ -13,7 +13,7 @@ from synthetic_study import synthetic_study
 from test_summary import disagreeing, unchecked
 
 from circuittex.claims import CLAIMS
-from circuittex.design import uniaxial
+from circuittex.design import Packing, Terminal, uniaxial
 from circuittex.plot import FIGURES
 from circuittex.report import page, write_report
 from circuittex.results import Study
@@ -131,6 +131,45 @@ def test_loading_paths_are_stated() -> None:
     text = parsed(replace(STUDY, design=replace(STUDY.design, loading=loading))).text
     row = text.index("strip")
     assert text[row : row + 5] == ["strip", "3", "0.1 to 0.2", "Fxx 1.1, Fxy 0, Fyx 0, Fyy 1", "yarns along y"]
+
+
+def rows_below(study: Study, heading: str) -> list[str]:
+    """The texts of the page below a heading."""
+    text = parsed(study).text
+    return text[text.index(heading) + 1 :]
+
+
+def test_the_packing_is_stated_where_it_is_random() -> None:
+    packing = Packing(seed=7, lateral=0.01, twist=0.002)
+    rows = rows_below(replace(STUDY, design=replace(STUDY.design, packing=packing)), "Random packing")
+    settings = ["seed", "7", "lateral", "0.01", "vertical", "0.0", "twist", "0.002", "phase", "0.0"]
+    assert rows[2:12] == settings
+    assert "Random packing" not in parsed(STUDY).text
+
+
+def test_terminals_are_stated_also_those_without_a_probe() -> None:
+    terminals = (*STUDY.design.terminals, Terminal("all", (("weft1", -1), ("weft2", +1))))
+    study = replace(STUDY, design=replace(STUDY.design, terminals=terminals))
+    rows = rows_below(study, "Terminals")
+    assert rows[rows.index("all") + 1] == "weft1-, weft2+"
+    assert rows[rows.index("common") + 1] == "warp2+"
+    bare = replace(study, design=replace(study.design, terminals=(), probes=()))
+    assert not {"Terminals", "Probes"} & set(parsed(bare).text)
+
+
+def test_who_is_made_of_what_is_stated() -> None:
+    weave = STUDY.design.weave
+    kind = weave.warp[0]
+    insulator = replace(kind.materials[0], name="nylon", electrical_conductivity=0.0)
+    plied = replace(kind, name="plied", materials=(*kind.materials[:4], insulator, *kind.materials[5:]))
+    mixed = replace(weave, warp=(plied, *weave.warp[1:]))
+    study = replace(STUDY, design=replace(STUDY.design, weave=mixed))
+    rows = rows_below(study, "Weave")
+    assert rows[rows.index("warp") + 1] == f"plied, 3 × {kind.name}"
+    assert rows[rows.index("weft") + 1] == f"4 × {kind.name}"
+    rows, name = rows_below(study, "Yarn plied"), kind.materials[0].name
+    assert rows[rows.index("materials") + 1] == f"4 × {name}, nylon, 5 × {name}"
+    assert "Material nylon" in rows
 
 
 def test_study_without_states(tmp_path: Path) -> None:

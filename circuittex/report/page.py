@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from html import escape
 from pathlib import Path
 from string import Template
@@ -18,6 +17,7 @@ from circuittex.report.captions import captions
 from circuittex.report.claims import claims_section
 from circuittex.report.errors import error_section
 from circuittex.report.frame import PAGE
+from circuittex.report.parameters import parameters
 from circuittex.report.table import number as _number
 from circuittex.report.table import table as _table
 from circuittex.results import Record, Study
@@ -53,7 +53,7 @@ def page(study: Study, pictures: Mapping[str, bytes], beside: Sequence[Study] = 
         claims=claims_section(claims),
         errors=error_section(study.errors),
         verification=_verification(study),
-        parameters=_parameters(study),
+        parameters=parameters(study.design),
         version=escape(study.version),
     )
 
@@ -175,57 +175,3 @@ def _ngspice_word(record: Record) -> str:
     if confirmed(record):
         return f"confirmed {check.note}".strip()
     return f"{'NOT CONFIRMED' if check.ngspice_checked else 'NOT CHECKED'} {check.note}".strip()
-
-
-def _parameters(study: Study) -> str:
-    design, weave = study.design, study.design.weave
-    yarns = dict.fromkeys(weave.warp + weave.weft)
-    materials = dict.fromkeys(material for yarn in yarns for material in yarn.materials)
-    parts = [
-        _settings("Weave", weave, skip=("draft", "warp", "weft")),
-        "<h3>Draft</h3><pre>" + "\n".join(" ".join("■" if over else "□" for over in row) for row in weave.draft[::-1]),
-        "</pre><p>A row is a warp yarn (the last at the top), a column a weft yarn; ■: the warp passes over.</p>",
-        *(_settings(f"Yarn {yarn.name}", yarn, skip=("name", "materials")) for yarn in yarns),
-        *(_settings(f"Material {material.name}", material, skip=("name",)) for material in materials),
-        _settings("Contact", design.contact),
-        _settings("Electrical", design.electrical),
-        _settings("Numerics", design.numerics),
-        _loading(study),
-        "<h3>Probes</h3>",
-        _table(
-            ["probe", "source", "sink", "voltage (V)"],
-            [[p.name, _ends(study, p.source), _ends(study, p.sink), _number(p.voltage)] for p in design.probes],
-        ),
-    ]
-    return "".join(parts)
-
-
-def _loading(study: Study) -> str:
-    if not study.design.loading:
-        return ""
-    head = ["path", "states", "strain", "last average deformation gradient", "ends let go"]
-    rows = [
-        [
-            path.name,
-            str(len(path.strains)),
-            f"{min(path.strains):g} to {max(path.strains):g}",
-            ", ".join(f"F{i}{j} {path.gradients[-1][a][b]:g}" for a, i in enumerate("xy") for b, j in enumerate("xy")),
-            f"yarns along {path.free}" if path.free else "none",
-        ]
-        for path in study.design.loading
-    ]
-    return f"<h3>Loading</h3>{_table(head, rows)}"
-
-
-def _ends(study: Study, name: str) -> str:
-    ends = next(terminal.ends for terminal in study.design.terminals if terminal.name == name)
-    return f"{name} ({', '.join(yarn + ('+' if side > 0 else '-') for yarn, side in ends)})"
-
-
-def _settings(title: str, part: object, skip: Sequence[str] = ()) -> str:
-    rows = [
-        [field.name.replace("_", " "), str(getattr(part, field.name))]
-        for field in fields(part)  # type: ignore[arg-type]
-        if field.name not in skip
-    ]
-    return f"<h3>{escape(title)}</h3>{_table(['setting', 'value in base units'], rows)}"

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from circuittex import tubes
 from circuittex.fields import Fields
@@ -131,12 +132,13 @@ def _same_scale(panels: Sequence[Axes], margin: float) -> None:
 def _axes_triad(axes: Axes, view: Camera, r: Floats) -> None:
     """Arrows of 1 mm along x, y and z in the corner of the picture."""
     low = view.project(r).min(axis=0)
+    readable = [withStroke(linewidth=2.5, foreground="white")]  # where a fibril lies behind
     for direction, name in zip(view.project(np.eye(3)), "xyz", strict=True):
         tip = low[:2] + direction[:2]
         arrow = {"arrowstyle": "-|>", "color": GREY, "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", tip, low[:2], arrowprops=arrow, annotation_clip=False)
         right, up = low[:2] + 1.25 * direction[:2]
-        axes.text(right, up, name, ha="center", va="center", color=GREY)
+        axes.text(right, up, name, ha="center", va="center", color=GREY, path_effects=readable)
     axes.text(low[0], low[1] - 0.15, "1 mm", ha="center", va="top", color=GREY, fontsize=8)
 
 

@@ -39,10 +39,10 @@ def _state(estimate: ErrorEstimate) -> str:
         "contact part",
         "order",
     ]
-    head += [f"{coarse} elements", f"{fine} elements", f"{more} contact points"]
+    head += [f"{coarse} elements", f"{fine} elements", f"{more} points"]
     warnings = "".join(f'<p class="bad">{escape(text)}</p>' for text in estimate.warnings)
     rows = table(head, [_row(quantity) for quantity in estimate.quantities])
-    return f"<h3>{escape(estimate.state)}</h3>{warnings}{rows}"
+    return f'<h3>{escape(estimate.state)}</h3>{warnings}<div class="numbers">{rows}</div>'
 
 
 def _row(quantity: QuantityError) -> list[str]:

@@ -27,6 +27,8 @@ th:first-child { text-align: left; }
 tbody th { font-weight: 500; white-space: nowrap; }
 .good, .bad { padding: .2rem 1rem; border-left: .4rem solid #009e73; background: #eef8f4; }
 .bad { border-color: #d55e00; background: #fdf1e8; font-weight: 600; }
+.numbers td { white-space: nowrap; }
+.numbers th, .numbers td { padding: .25rem .5rem; }
 .claims th, .claims td { text-align: left; vertical-align: top; min-width: 11rem; }
 .claims tbody th { white-space: normal; min-width: 19rem; }
 .claims small { display: block; margin-top: .25rem; font-weight: 400; color: #555; }

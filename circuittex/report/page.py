@@ -159,7 +159,7 @@ def _verification_row(record: Record) -> list[str]:
     check = record.verification
     return [
         record.name,
-        ", ".join(check.routes),
+        ",\u00a0".join(check.routes),  # in one line
         _number(check.max_voltage_difference, 2),
         _number(check.max_current_difference, 2),
         _number(record.reduced_difference, 2),

@@ -19,7 +19,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def number(value: float, digits: int = 4) -> str:
     """A number to read, with a dash for what is undefined.
 
-    >>> number(0.28294, 3), number(float("nan"))
-    ('0.283', '–')
+    >>> number(0.28294, 3), number(1234.5, 2), number(float("nan"))
+    ('0.283', '1200', '–')
     """
-    return f"{value:.{digits}g}" if value == value else "–"
+    return f"{float(f'{value:.{digits}g}'):g}" if value == value else "–"

@@ -84,6 +84,8 @@ def record_state(study: Study, step: Step, reached: Increment, say: Callable[[st
         parts=reached.parts,
         history=equilibrium.history,
         clamp_force=clamp_force(mesh, equilibrium.reaction),
+        end_force=equilibrium.reaction[mesh.ends],
+        energy=equilibrium.energy,
         section_force=np.linalg.norm(equilibrium.section_force, axis=1),
         contacts=contacts,
         fields=fields,

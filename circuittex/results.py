@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from circuittex.contact.state import ContactState
 from circuittex.design import Design
 from circuittex.discretisation import ErrorEstimate
@@ -37,6 +39,11 @@ class Record:
     """(n, 4) per iteration of the last part: residual N, energy N mm, shift N/(mm g), step length."""
     clamp_force: Floats
     """(2, 3) total force of the clamps on the +x ends of the warp and the +y ends of the weft, N [40, 41]."""
+    end_force: Floats
+    """(2F, 3) force of the clamps on each fibril end, in the order of `FibrilMesh.ends`, N; zero at ends that are not
+    held, up to the residual."""
+    energy: float
+    """Stored elastic and contact energy, N mm."""
     section_force: Floats
     """(M,) magnitude of the section force |∫ P E3 dA| in each element, N."""
     contacts: ContactState
@@ -57,6 +64,13 @@ class Record:
     """Levels in which the fibrils of the centre warp yarn lie at its centre crossing."""
     netlist: str
     """Path of the detailed sub-circuit, relative to the results folder (if the study has one)."""
+
+    @property
+    def reaction(self) -> Floats:
+        """(N, 3) force of the clamps on each node, N: that on the fibril ends, and zero inside."""
+        reaction = np.zeros_like(self.configuration.r)
+        reaction[self.contacts.mesh.ends] = self.end_force
+        return reaction
 
     @property
     def currents(self) -> tuple[float, ...]:

@@ -24,6 +24,11 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
     ``clamp_force_N``
         ``x``: total force of the clamps on the +x ends of the warp; ``y``: on the +y ends of the weft; three
         components each [40, 41]
+    ``stored_energy_N_mm``
+        elastic and contact energy
+    ``clamp_work_N_mm``, ``stored_energy_change_N_mm``, ``energy_loss_N_mm``
+        work of the clamps in the step from the recorded state before on the path (for its first state: from the relaxed
+        one) by the trapezoidal rule, how much of it was stored, and the rest; null for the relaxed state
     ``currents_A``, ``peak_temperature_K``
         current of each probe, and the largest temperature rise over all probes
     ``Ry_ohm``, ``Rc_ohm``, ``fit_residual``, ``fit_warnings``
@@ -65,12 +70,14 @@ from circuittex.discretisation import ErrorEstimate
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results import Record, Study
 from circuittex.verify import AGREEMENT
+from circuittex.work import EnergyBalance, step_balances
 
 FORMAT = 1
 
 
 def summary(study: Study) -> dict[str, Any]:
     """The content of summary.json, as plain lists, dictionaries, numbers and texts."""
+    steps = step_balances(study)
     content: dict[str, Any] = _plain(
         {
             "format": FORMAT,
@@ -80,7 +87,7 @@ def summary(study: Study) -> dict[str, Any]:
             "parameters": study.design,
             "probes": [probe.name for probe in study.design.probes],
             "insulated_Ry_ohm": insulated_resistance(study.mesh),
-            "states": [_state(record, study.error_of(record.name)) for record in study.records],
+            "states": [_state(record, steps.get(record.name), study.error_of(record.name)) for record in study.records],
         }
     )
     return content
@@ -215,7 +222,7 @@ def insulated_resistance(mesh: FibrilMesh) -> float:
     return float(np.mean(1.0 / (conductance * np.maximum(crossings, 1))[conducts])) if conducts.any() else math.inf
 
 
-def _state(record: Record, error: ErrorEstimate | None) -> dict[str, Any]:
+def _state(record: Record, step: EnergyBalance | None, error: ErrorEstimate | None) -> dict[str, Any]:
     verification = record.verification
     return {
         "name": record.name,
@@ -226,6 +233,10 @@ def _state(record: Record, error: ErrorEstimate | None) -> dict[str, Any]:
         "newton_iterations": record.iterations,
         "parts": record.parts,
         "clamp_force_N": {"x": record.clamp_force[0], "y": record.clamp_force[1]},
+        "stored_energy_N_mm": record.energy,
+        "clamp_work_N_mm": None if step is None else step.work.item(),
+        "stored_energy_change_N_mm": None if step is None else step.stored.item(),
+        "energy_loss_N_mm": None if step is None else step.loss.item(),
         "currents_A": record.currents,
         "peak_temperature_K": record.peak_temperature,
         "Ry_ohm": record.fit.Ry,

@@ -3,13 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 
 from circuittex.errors import DesignError
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import FibrilMesh, Floats
-from circuittex.relaxation import Equilibrium
+from circuittex.mech.configuration import Configuration
+from circuittex.paths import loading_paths
+from circuittex.results import Study
+
+
+class Held(Protocol):
+    """What the balance asks of a state: an `Equilibrium` and the `Record` of one have it."""
+
+    @property
+    def configuration(self) -> Configuration: ...
+    @property
+    def reaction(self) -> Floats:
+        """(N, 3) force of the clamps on each node, N."""
+
+    @property
+    def energy(self) -> float:
+        """Stored elastic and contact energy, N mm."""
 
 
 @frozen
@@ -51,14 +69,26 @@ def balance(position: Floats, force: Floats, energy: Floats) -> EnergyBalance:
     return EnergyBalance(work=np.sum(mean * np.diff(position, axis=0), axis=(1, 2)), stored=np.diff(energy))
 
 
-def clamp_balance(mesh: FibrilMesh, path: Sequence[Equilibrium]) -> EnergyBalance:
+def clamp_balance(mesh: FibrilMesh, path: Sequence[Held]) -> EnergyBalance:
     """The energy balance of a fabric along a path of equilibria, in the order in which they were reached.
 
     The clamps are the two ends of every fibril [49]; ends that are not held carry no force and do no work.
     """
-    ends = np.concatenate([mesh.end_nodes(-1), mesh.end_nodes(+1)])
+    ends = mesh.ends
     return balance(
         np.array([state.configuration.r[ends] for state in path]).reshape(-1, len(ends), 3),
         np.array([state.reaction[ends] for state in path]).reshape(-1, len(ends), 3),
         np.array([state.energy for state in path]),
     )
+
+
+def step_balances(study: Study) -> dict[str, EnergyBalance]:
+    """State -> the balance of the one step that led to it, from the recorded state before it on its loading path.
+
+    The first step of a path starts at the relaxed state, which no step leads to.
+    """
+    return {
+        after.name: clamp_balance(study.mesh, (before, after))
+        for records in loading_paths(study).values()
+        for before, after in pairwise(records)
+    }

@@ -67,6 +67,7 @@ def _record(
     gradient = np.array(_gradient(path, strain))
     slope = 4.0 if path == "shear" else 18.0
     state = _contacts(mesh, contacts, rng)
+    clamp_force = np.array([[1.49 + slope * strain, 0.01, 0.002], [0.001, 1.49 + 2 * strain, -0.01]])
     return Record(
         name=f"{path}-{strain:.4f}" if path else "relaxed",
         path=path,
@@ -77,7 +78,9 @@ def _record(
         iterations=52 if not path else 14,
         parts=1,
         history=rng.random((5, 4)),
-        clamp_force=np.array([[1.49 + slope * strain, 0.01, 0.002], [0.001, 1.49 + 2 * strain, -0.01]]),
+        clamp_force=clamp_force,
+        end_force=_end_force(mesh, clamp_force),
+        energy=0.4 + 8.0 * strain * (1.49 + slope * strain / 2),
         section_force=0.03 + 0.01 * np.sin(mesh.xi[mesh.elements[:, 0]] + mesh.element_fibril) + 0.2 * strain,
         contacts=state,
         fields=tuple(_fields(design, mesh, state, number, strain, rng) for number in range(len(design.probes))),
@@ -109,6 +112,13 @@ def _record(
         ),
         netlist=f"netlists/{path or 'relaxed'}-{strain:.4f}.cir",
     )
+
+
+def _end_force(mesh: FibrilMesh, clamp_force: Floats) -> Floats:
+    """The total forces on the fibrils' plus ends in equal parts, and against them at the minus ends."""
+    axis = mesh.yarn_axis[mesh.yarn]
+    share = clamp_force[axis] / np.bincount(axis)[axis, None]
+    return np.concatenate([-share, share])
 
 
 def _flattened(mesh: FibrilMesh, gradient: Floats) -> Configuration:

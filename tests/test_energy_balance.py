@@ -6,18 +6,29 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 from fabrics import small_cell
+from synthetic_study import synthetic_study
 
 from circuittex.contact.extract import contacts_of
-from circuittex.design import Design, plain_weave
+from circuittex.design import Design, load_unload, plain_weave, shear, uniaxial
 from circuittex.errors import DesignError
 from circuittex.geometry.mesh import FibrilMesh, Floats
 from circuittex.geometry.weave import build_mesh
+from circuittex.increment import advance
+from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation import Equilibrium, move, relax
-from circuittex.work import EnergyBalance, balance, clamp_balance
+from circuittex.report.energy import energy_section
+from circuittex.report.table import number
+from circuittex.results import Record, Study
+from circuittex.store import load_study, write_study_start
+from circuittex.study import run_study
+from circuittex.summary import summary
+from circuittex.work import EnergyBalance, balance, clamp_balance, step_balances
 
 TOLERANCE = 1e-7  # N, largest free force
 SAME = 1e-5
@@ -255,3 +266,99 @@ def test_a_snap_is_a_jump_to_other_contacts(loop: Loop) -> None:
         assert (motion > JUMP) == snaps[k]
         if snaps[k]:
             assert loop.fabric.touching(before) != loop.fabric.touching(after)
+
+
+# ---- The records of a study ----------------------------------------------------------------------------------
+
+SPRING = 3.0  # N/mm
+
+
+def sprung(record: Record, pull: float, lost: float = 0.0) -> Record:
+    """The record as if each fibril were a spring that its plus end stretches by `pull` along its yarn."""
+    mesh = record.contacts.mesh
+    way = np.eye(3)[mesh.yarn_axis[mesh.yarn]] * pull
+    x = initial_configuration(mesh).x.copy()
+    x[mesh.end_nodes(+1), 0] += way
+    return replace(
+        record,
+        configuration=Configuration(x),
+        end_force=np.concatenate([-SPRING * way, SPRING * way]),
+        energy=mesh.n_fibrils * SPRING * pull**2 / 2 - lost,
+    )
+
+
+def springs() -> Study:
+    """Springs pulled by 0.1 mm, then on two paths to 0.2 and 0.4, and to 0.3 and 0.1, where 0.05 N mm are lost."""
+    study = synthetic_study(3, contacts=4, rows=(1,), paths=("stretch", "shear"))
+    pulls, lost = (0.1, 0.2, 0.4, 0.3, 0.1), (0.0, 0.0, 0.0, 0.0, 0.05)
+    return replace(study, records=tuple(map(sprung, study.records, pulls, lost)))
+
+
+def test_the_steps_of_a_study_start_at_the_relaxed_state_on_every_path() -> None:
+    study = springs()
+    found = step_balances(study)
+    stiffness = study.mesh.n_fibrils * SPRING
+    steps = {"stretch-0.0250": (0.1, 0.2), "stretch-0.0500": (0.2, 0.4)}
+    steps |= {"shear-0.0250": (0.1, 0.3), "shear-0.0500": (0.3, 0.1)}
+    assert list(found) == list(steps)
+    for name, (before, after) in steps.items():
+        assert found[name].work == pytest.approx([stiffness * (after**2 - before**2) / 2], rel=1e-12)
+        assert found[name].loss == pytest.approx([0.05 if name == "shear-0.0500" else 0.0], abs=1e-12)
+
+
+def test_the_summary_has_the_energies_of_every_state() -> None:
+    keys = ("stored_energy_N_mm", "clamp_work_N_mm", "stored_energy_change_N_mm", "energy_loss_N_mm")
+    states = {state["name"]: [state[key] for key in keys] for state in summary(springs())["states"]}
+    stiffness = springs().mesh.n_fibrils * SPRING
+    assert states["relaxed"] == [pytest.approx(stiffness * 0.005), None, None, None]
+    expected = [stiffness * 0.005 - 0.05, -stiffness * 0.04, -stiffness * 0.04 - 0.05, 0.05]
+    assert states["shear-0.0500"] == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_report_has_a_table_of_energies() -> None:
+    text = energy_section(springs())
+    assert '<th scope="row">relaxed</th><td>0.12</td><td>–</td><td>–</td><td>–</td>' in text
+    assert '<th scope="row">shear-0.0500</th><td>0.07</td><td>-0.96</td><td>-1.01</td><td>0.05</td>' in text
+
+
+def test_forces_on_the_ends_are_those_on_the_nodes() -> None:
+    record = springs().records[2]
+    mesh = record.contacts.mesh
+    for side, sign in ((-1, -1.0), (+1, 1.0)):
+        expected = sign * 0.4 * SPRING * np.eye(3)[mesh.yarn_axis[mesh.yarn]]
+        assert record.reaction[mesh.end_nodes(side)] == pytest.approx(expected, rel=1e-12)
+    assert np.count_nonzero(record.reaction.any(axis=1)) == 2 * mesh.n_fibrils
+
+
+def test_a_study_keeps_the_balance_of_its_equilibria(tmp_path: Path) -> None:
+    """The same equilibria computed without a study; on the strip the weft is let go and does no work any more."""
+    design, mesh = small_cell((1, 2), elements=4, tolerance=TOLERANCE)
+    loading = (load_unload(uniaxial("cycle", (0.03, 0.06))), shear("strip", (0.05, 0.1), free="y"))
+    design = replace(design, terminals=(), probes=(), loading=loading)
+    study = run_study(design, workers=1, solver=MultifrontalSolver)
+    expected: dict[str, EnergyBalance] = {}
+    rest = relax(mesh, design, solver=MultifrontalSolver())
+    for path in design.loading:
+        states = [rest]
+        gradients = [np.eye(2), *map(np.array, path.gradients)]
+        for one, other in pairwise(gradients):
+            start = states[-1].configuration
+            found = advance(mesh, design, start, one, other, free=path.free, solver=MultifrontalSolver())
+            states.append(found.equilibrium)
+        whole = clamp_balance(mesh, states)
+        names = [record.name for record in study.records if record.path == path.name]
+        assert len(names) == len(whole.work)
+        expected |= {n: EnergyBalance(whole.work[k : k + 1], whole.stored[k : k + 1]) for k, n in enumerate(names)}
+    write_study_start(tmp_path / "results.h5", study)
+    text = energy_section(study)
+    for kept in (study, load_study(tmp_path / "results.h5")):
+        balances = step_balances(kept)
+        assert list(balances) == list(expected)
+        for name, step in expected.items():
+            # Either may stand elsewhere within the tolerance, which moves energies in second order.
+            assert balances[name].work == pytest.approx(step.work, rel=1e-6)
+            assert balances[name].stored == pytest.approx(step.stored, rel=1e-6)
+            cells = "".join(f"<td>{number(value.item())}</td>" for value in (step.work, step.stored))
+            assert f"{cells}<td>" in text[text.index(f'<th scope="row">{name}</th>') :]
+    loss = sum(step.loss.item() for name, step in expected.items() if name.startswith("cycle"))
+    assert abs(loss) < 0.02 * max(step.work.item() for step in expected.values())

@@ -97,6 +97,15 @@ def older(folder: Path) -> tuple[str, ...]:
     return "0.0.1", STUDY.version
 
 
+def lacking(folder: Path) -> tuple[str, ...]:
+    """As an older version left it, whose records had fewer fields."""
+    write_study_start(folder / "results.h5", STUDY)
+    with h5py.File(folder / "results.h5", "r+") as file:
+        for record in file["records"].values():
+            del record.attrs["energy"], record["end_force"]
+    return str(folder / "results.h5"), "the fields of Record are not those of this version of circuittex"
+
+
 def damaged(folder: Path) -> tuple[str, ...]:
     (folder / "results.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
     return (str(folder / "results.h5"), "cannot be read")
@@ -113,7 +122,7 @@ def orphaned(folder: Path) -> tuple[str, ...]:
     return (str(folder), "no results.h5")
 
 
-@pytest.mark.parametrize("spoil", [changed, older, damaged, foreign, orphaned])
+@pytest.mark.parametrize("spoil", [changed, older, lacking, damaged, foreign, orphaned])
 def test_other_results_are_refused_and_stay(
     spoil: Callable[[Path], tuple[str, ...]], used: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

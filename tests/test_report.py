@@ -72,7 +72,7 @@ def test_names_are_shown_as_they_are() -> None:
 def test_numbers_are_in_the_tables() -> None:
     text = parsed(STUDY).text
     for record in STUDY.records:
-        assert text.count(record.name) == 5  # states, forces, equilibrium, network, verification
+        assert text.count(record.name) == 6  # states, forces, equilibrium, energy, network, verification
         assert record.netlist in text
         assert f"{record.currents[2]:.4g}" in text
         assert f"{record.fit.Ry:.4g}" in text

@@ -13,6 +13,7 @@ import pytest
 from synthetic import fibrils
 from synthetic_study import INSULATED, synthetic_study
 
+import circuittex.summary as summary_module
 from circuittex.frozen import same
 from circuittex.results import Study
 from circuittex.summary import effort, insulated_resistance, ngspice_statement, summary, table, write_summary
@@ -61,6 +62,13 @@ def test_keys_that_the_documentation_promises(tmp_path: Path) -> None:
     assert state["verification"]["routes"] == ["fields", "nodal", "ngspice"]
     assert state["verification"]["max_voltage_difference_V"] == 4e-13
     assert state["verification"]["max_current_difference"] == 2e-12
+
+
+def test_the_documentation_lists_every_key_of_a_state() -> None:
+    text = (Path(__file__).parents[1] / "docs" / "results.md").read_text(encoding="utf-8")
+    for key in summary(STUDY)["states"][0]:
+        assert f"`{key}`" in text
+        assert f"``{key}``" in str(summary_module.__doc__)
 
 
 def test_undefined_numbers_are_null(tmp_path: Path) -> None:

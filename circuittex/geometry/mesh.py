@@ -84,3 +84,8 @@ class FibrilMesh:
     def end_nodes(self, side: int) -> Ints:
         """(F,) node at xi3 = 0 (`side` -1, the minus end) or at xi3 = L (`side` +1, the plus end)."""
         return self.first_node[:-1] if side < 0 else self.first_node[1:] - 1
+
+    @property
+    def ends(self) -> Ints:
+        """(2F,) nodes of all fibril ends, where the clamps are: the minus ends, then the plus ends."""
+        return np.concatenate([self.end_nodes(-1), self.end_nodes(+1)])

@@ -15,6 +15,7 @@ from circuittex.claims.table import Table, claims_table
 from circuittex.plot import save_figures
 from circuittex.report.captions import captions
 from circuittex.report.claims import claims_section
+from circuittex.report.energy import energy_section
 from circuittex.report.errors import error_section
 from circuittex.report.frame import PAGE
 from circuittex.report.parameters import parameters
@@ -115,6 +116,7 @@ def _states(study: Study) -> str:
     ]
     return (
         f"{_table(head, rows)}<h3>Clamp forces</h3>{_forces(study)}<h3>Equilibrium</h3>{_equilibrium(study)}"
+        f"{energy_section(study)}"
         if rows
         else "<p>No state has been recorded.</p>"
     )

@@ -86,6 +86,10 @@ class ErrorEstimate:
     warnings: tuple[str, ...]
     """What limits the estimate; empty if all is well."""
 
+    def quantity(self, name: str) -> QuantityError:
+        """The quantity of that name: 'Fx warp', 'Fy weft', 'I ' with the name of a probe, 'Ry' or 'Rc'."""
+        return {quantity.name: quantity for quantity in self.quantities}[name]
+
 
 def observed_order(coarse: float, middle: float, fine: float) -> float:
     """log2((coarse - middle) / (middle - fine)), for meshes halved in size each time.

@@ -5,12 +5,14 @@ from __future__ import annotations
 import subprocess
 import sys
 from dataclasses import replace
+from math import nan
 from pathlib import Path
 from xml.etree import ElementTree
 
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
@@ -18,6 +20,7 @@ from matplotlib.figure import Figure
 from synthetic import fibrils
 from synthetic_study import INSULATED, synthetic_study
 
+from circuittex.discretisation import ErrorEstimate, QuantityError
 from circuittex.geometry.mesh import FibrilMesh, Floats
 from circuittex.mech.configuration import initial_configuration
 from circuittex.paths import farthest, loading_paths, turns
@@ -33,7 +36,7 @@ from circuittex.plot import (
 )
 from circuittex.plot.cut import cut
 from circuittex.plot.scene import camera, draw_tubes
-from circuittex.plot.style import save, style
+from circuittex.plot.style import COLOURS, save, style
 from circuittex.results import Study
 from circuittex.store.archive import Digests
 
@@ -209,6 +212,110 @@ def test_the_way_back_is_marked() -> None:
     assert back.get_markerfacecolor() == "white"
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["strain growing", "on the way back"]
     assert force_figure(STUDY).legends == []
+
+
+def estimate(study: Study, state: str, error: float) -> ErrorEstimate:
+    """An estimate of this relative error for every quantity of a state."""
+    record = next(record for record in study.records if record.name == state)
+    names = ("Fx warp", "Fy weft", *(f"I {probe.name}" for probe in study.design.probes), "Ry", "Rc")
+    force, fit = record.clamp_force, record.fit
+    values = (force[0, 0], force[1, 1], *record.currents, fit.Ry, fit.Rc)
+    quantities = []
+    for name, value in zip(names, values, strict=True):
+        away = (1.0 + 0.6 * error) * value  # the contact part 1.25 * 4 / 3 of that is all: the mesh changes nothing
+        quantities.append(QuantityError(name, "", float(value), float(value), float(value), float(away)))
+    return ErrorEstimate(state, (1, 2, 4), (4, 8), np.zeros(3), tuple(quantities), ())
+
+
+def bars(axes: Axes) -> list[tuple[float, float, float]]:
+    """Strain, lower and upper end of every error bar drawn, in the order of drawing, each once."""
+    lines = [line for line in axes.lines if line.get_zorder() == 1.9 and len(line.get_xdata()) == 2]
+    found = ((line.get_xdata()[0], *line.get_ydata()) for line in lines)
+    return list(dict.fromkeys(tuple(map(float, bar)) for bar in found))
+
+
+def heads(axes: Axes) -> list[bool]:
+    """For each end of each error bar whether it is an arrow head, not a cap."""
+    ends = [line for line in axes.lines if line.get_zorder() == 1.9 and len(line.get_xdata()) == 1]
+    return [line.get_marker() != "_" for line in ends]
+
+
+def test_error_bars_are_at_the_states_and_on_the_curves_that_have_an_estimate() -> None:
+    errors = tuple(estimate(STUDY, name, 0.02) for name in ("relaxed", "stretch-0.0250"))
+    study = replace(STUDY, errors=errors)
+    rest, stretched, _ = STUDY.records
+
+    def expected(*values: tuple[float, float]) -> list[tuple[float, float, float]]:
+        return [(strain, pytest.approx(0.98 * value), pytest.approx(1.02 * value)) for strain, value in values]
+
+    warp, shear_warp, weft, shear_weft = (force_figure(study).axes[k] for k in (0, 2, 1, 3))
+    for axes, side in ((warp, 0), (weft, 1)):
+        assert bars(axes) == expected((0.0, rest.clamp_force[side, side]), (0.025, stretched.clamp_force[side, side]))
+        assert {line.get_color() for line in axes.lines if line.get_zorder() == 1.9} == {COLOURS[side]}
+    assert bars(shear_warp) == expected((0.0, rest.clamp_force[0, 0]))
+    assert bars(shear_weft) == expected((0.0, rest.clamp_force[1, 1]))
+    for number, axes in enumerate(conductance_figure(study).axes):
+        assert bars(axes) == expected((0.0, rest.currents[number]), (0.025, stretched.currents[number]))
+    left, right = network_figure(study).axes
+    assert bars(left) == expected((0.0, rest.fit.Ry), (0.025, stretched.fit.Ry))
+    assert bars(right) == expected((0.0, rest.fit.Rc), (0.025, stretched.fit.Rc))
+    for axes in (*force_figure(study).axes, left):
+        assert not any(heads(axes))
+
+
+def test_no_error_bar_where_the_error_is_not_known() -> None:
+    unknown = estimate(STUDY, "relaxed", nan)
+    for figure in (force_figure, conductance_figure, network_figure):
+        drawn, without = figure(replace(STUDY, errors=(unknown,))), figure(STUDY)
+        for axes, other in zip(drawn.axes, without.axes, strict=True):
+            assert bars(axes) == []
+            assert axes.get_ylim() == other.get_ylim()
+
+
+@pytest.mark.parametrize(("error", "cut"), [(0.02, False), (5.0, True), (1e4, True)])
+def test_long_error_bars_leave_a_third_of_the_height_to_the_curve(error: float, cut: bool) -> None:
+    study = replace(STUDY, errors=(estimate(STUDY, "stretch-0.0250", error),))
+    axes, without = force_figure(study).axes[0], force_figure(STUDY).axes[0]
+    (low, high), (first, last) = axes.get_ylim(), without.get_ylim()
+    assert low <= first
+    assert high >= last
+    assert high - low <= 3.0 * (last - first) * (1 + 1e-9)
+    ((_, lower, upper),) = bars(axes)
+    value = STUDY.records[1].clamp_force[0, 0]
+    assert heads(axes) == [cut, cut]
+    assert (lower, upper) == ((low, high) if cut else pytest.approx(((1 - error) * value, (1 + error) * value)))
+    assert [text.get_text() for text in axes.texts] == ([f"±{float(f'{error * value:.2g}'):g}"] if cut else [])
+
+
+def test_the_error_of_one_value_alone_is_shown_whole() -> None:
+    lone = replace(STUDY, records=STUDY.records[:1], errors=(estimate(STUDY, "relaxed", 0.5),))
+    axes = conductance_figure(lone).axes[0]
+    value = STUDY.records[0].currents[0]
+    assert bars(axes) == [(0.0, pytest.approx(value / 2), pytest.approx(1.5 * value))]
+    assert heads(axes) == [False, False]
+    assert axes.get_ylim()[0] < value / 2
+    assert axes.get_ylim()[1] > 1.5 * value
+
+
+def test_a_cycle_that_closes_names_its_cut_error_once() -> None:
+    cycle = with_strains((0.1, 0.2, 0.1, 0.0))
+    errors = (estimate(STUDY, "relaxed", 1e3), replace(estimate(STUDY, "relaxed", 1e3), state="cycle-3"))
+    figure = conductance_figure(replace(cycle, errors=errors))
+    assert [len(axes.texts) - len(conductance_figure(cycle).axes[0].texts) for axes in figure.axes] == [1, 1, 1]
+
+
+def test_legends_name_error_bars_once_and_panels_only_their_curves() -> None:
+    cycle = with_strains((0.1, 0.2, 0.1, 0.0))
+    figure = force_figure(replace(cycle, errors=(estimate(cycle, "relaxed", 0.1),)))
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        *("strain growing", "on the way back", "estimated discretisation error"),
+    ]
+    for axes in figure.axes:
+        legend = axes.get_legend()
+        assert legend is not None
+        assert [text.get_text() for text in legend.get_texts()] == ["Fx", "Fy", "Fz"]
+    (key,) = network_figure(replace(STUDY, errors=(estimate(STUDY, "relaxed", 0.1),))).legends[0].get_texts()
+    assert key.get_text() == "estimated discretisation error"
 
 
 def test_every_probe_of_every_path_has_a_picture_of_one_scale() -> None:

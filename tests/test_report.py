@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from synthetic_study import synthetic_study
+from test_stored_errors import made_up
 from test_summary import disagreeing, unchecked
 
 from circuittex.claims import CLAIMS
@@ -170,6 +171,15 @@ def test_who_is_made_of_what_is_stated() -> None:
     rows, name = rows_below(study, "Yarn plied"), kind.materials[0].name
     assert rows[rows.index("materials") + 1] == f"4 × {name}, nylon, 5 × {name}"
     assert "Material nylon" in rows
+
+
+def test_captions_say_what_bars_are_where_there_are_bars() -> None:
+    pictures = dict.fromkeys(FIGURES, PNG)
+    assert "estimated discretisation error" not in page(STUDY, pictures)
+    text = page(replace(STUDY, errors=(made_up("relaxed"),)), pictures)
+    for what in ("of the force along the yarns", "of the currents", "of Ry and Rc"):
+        # once as the caption and once for those who see no picture
+        assert text.count(f"the estimated discretisation error {what}") == 2
 
 
 def test_study_without_states(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,11 +12,14 @@ from numpy.typing import NDArray
 
 from circuittex.geometry.mesh import Floats
 from circuittex.paths import loading_paths, turns
+from circuittex.plot.error_bars import Bar, draw_error_bars, error_bar_key
 from circuittex.plot.style import COLOURS, GREY, LINES, MARKERS, new_figure, style
 from circuittex.results import Record, Study
 from circuittex.summary import insulated_resistance
 
 CLAMPS = ("warp clamps, +x ends", "weft clamps, +y ends")
+ESTIMATED = ("Fx warp", "Fy weft")
+"""What error estimates call the force along the yarns at these clamps."""
 MOST_COLUMNS = 3
 
 
@@ -33,9 +36,10 @@ def force_figure(study: Study) -> Figure:
                 axes = figure.add_subplot(rows, columns, (2 * block + side) * columns + column + 1)
                 for component, name in enumerate(("Fx", "Fy", "Fz")):
                     _line(axes, records, _clamp_force(side, component), COLOURS[component], component, name)
+                draw_error_bars(axes, _bars(study, [records], ESTIMATED[side]), COLOURS[side])
                 axes.set_title(f"{path}: {clamps}" if path else clamps)
                 axes.set_ylabel("force (N)")
-        _finish(figure, list(paths.values()), [path for path in paths for _ in CLAMPS])
+        _finish(figure, study, [path for path in paths for _ in CLAMPS])
     return figure
 
 
@@ -50,9 +54,10 @@ def conductance_figure(study: Study) -> Figure:
             axes = figure.add_subplot(rows, columns, number + 1)
             for k, (path, records) in enumerate(paths.items()):
                 _line(axes, records, _current(number), COLOURS[number % len(COLOURS)], k, path)
+            draw_error_bars(axes, _bars(study, paths.values(), f"I {probe.name}"), COLOURS[number % len(COLOURS)])
             axes.set_title(f"probe {probe.name}")
             axes.set_ylabel(f"current at {probe.voltage:g} V (A)")
-        _finish(figure, list(paths.values()), [])
+        _finish(figure, study, [])
     return figure
 
 
@@ -70,6 +75,8 @@ def network_figure(study: Study) -> Figure:
             left.axhline(insulated, color=GREY, linestyle="--", linewidth=1.0, label=f"insulated, {insulated:.4g} Ω")
             low, high = left.get_ylim()  # at least 1 % either side, lest differences in the fifth digit fill the axis
             left.set_ylim(min(low, 0.99 * insulated), max(high, 1.01 * insulated))
+        draw_error_bars(left, _bars(study, paths.values(), "Ry"), COLOURS[0])
+        draw_error_bars(right, _bars(study, paths.values(), "Rc"), COLOURS[1])
         for axes, ohms in ((left, [r.fit.Ry for r in study.records]), (right, [r.fit.Rc for r in study.records])):
             if not np.isfinite(ohms).any():
                 axes.text(0.5, 0.5, "infinite or not determined", ha="center", va="center", transform=axes.transAxes)
@@ -77,7 +84,7 @@ def network_figure(study: Study) -> Figure:
         left.set_ylabel("Ry (Ω)")
         right.set_title("crossing")
         right.set_ylabel("Rc (Ω)")
-        _finish(figure, list(paths.values()), [])
+        _finish(figure, study, [])
     return figure
 
 
@@ -87,6 +94,15 @@ def _clamp_force(side: int, component: int) -> Callable[[Record], float]:
 
 def _current(number: int) -> Callable[[Record], float]:
     return lambda record: record.currents[number]
+
+
+def _bars(study: Study, paths: Iterable[Sequence[Record]], name: str) -> Iterator[Bar]:
+    """The error bars of these paths for the quantity that error estimates call `name`, in the dashes of their lines."""
+    for kind, records in enumerate(paths):
+        for record in records:
+            if (estimate := study.error_of(record.name)) is not None:
+                quantity = estimate.quantity(name)
+                yield Bar(record.strain, quantity.value, quantity.absolute, LINES[kind % len(LINES)])
 
 
 def _line(
@@ -114,17 +130,22 @@ def _on_the_way_back(strain: Floats) -> NDArray[np.bool_]:
     return back
 
 
-def _finish(figure: Figure, paths: Sequence[Sequence[Record]], names: Sequence[str]) -> None:
+def _finish(figure: Figure, study: Study, names: Sequence[str]) -> None:
     """Labels and legends; `names` are the paths of the panels where each shows but one."""
+    paths = list(loading_paths(study).values())
     only = names or [records[-1].path if len(paths) == 1 else "" for records in paths[:1] for _ in figure.axes]
     for axes, name in zip(figure.axes, only, strict=True):
         axes.set_xlabel(f"strain ({name})" if name else "strain")
         axes.ticklabel_format(axis="y", useOffset=False)
         if axes.get_legend_handles_labels()[1]:
             axes.legend()
+    keys = []
     if any(turns([record.strain for record in records]) for records in paths):
-        filled, hollow = (
+        keys += [
             Line2D([], [], marker="o", linestyle="", color=GREY, markerfacecolor=face, markersize=4.5, label=label)
             for face, label in ((GREY, "strain growing"), ("white", "on the way back"))
-        )
-        figure.legend(handles=[filled, hollow], loc="outside lower center", ncols=2)
+        ]
+    if study.errors:
+        keys.append(error_bar_key())
+    if keys:
+        figure.legend(handles=keys, loc="outside lower center", ncols=3 if figure.get_figwidth() > 6.0 else 2)

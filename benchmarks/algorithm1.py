@@ -29,7 +29,8 @@ from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.dynamics import STEP_TOLERANCE, Inertia, damping_matrix
-from circuittex.mech.linear import LinearSolver, Solve, best_solver
+from circuittex.mech.linear import LinearSolver, Solve
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import Pattern, build_pattern, diagonal
 from circuittex.mech.terms import ForceTerm
 from circuittex.relaxation import force_terms, relax
@@ -59,7 +60,7 @@ class March:
         space, beam, _ = force_terms(self.mesh, self.design)
         q = space.vector(initial_configuration(self.mesh))
         inertia = Inertia(beam.mass, damping_matrix(space, GAMMA), self.dt)
-        velocity, solver = np.zeros_like(q), best_solver()
+        velocity, solver = np.zeros_like(q), MultifrontalSolver()
         free = np.ones(len(q), dtype=bool)
         free[space.fixed] = False
         while True:

@@ -30,7 +30,7 @@ from watch import PARTS, descend
 from circuittex.design import Design, plain_weave
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
-from circuittex.mech.linear import best_solver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation import force_terms, relax
 
 Result = dict[str, Any]
@@ -50,7 +50,7 @@ def measured(yarns: int, per_crossing: int, iterations: int) -> Result:
     design = weave(yarns, per_crossing)
     mesh = build_mesh(design)
     terms = force_terms(mesh, design)
-    start, solver = terms[0].vector(initial_configuration(mesh)), best_solver()
+    start, solver = terms[0].vector(initial_configuration(mesh)), MultifrontalSolver()
     found: list[Any] = []
     limit = iterations or 10 * design.numerics.max_iterations
     tolerance = design.numerics.tolerance

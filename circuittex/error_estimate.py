@@ -18,7 +18,8 @@ from circuittex.frozen import frozen
 from circuittex.geometry.mesh import FibrilMesh, Floats
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration
-from circuittex.mech.linear import LinearSolver, best_solver
+from circuittex.mech.linear import LinearSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation import clamp_force, relax
 from circuittex.results import Record, Study
 from circuittex.transfer import transfer
@@ -74,7 +75,7 @@ def estimate_error(
     design: Design,
     mesh: FibrilMesh,
     record: Record,
-    solver: Callable[[], LinearSolver] = best_solver,
+    solver: Callable[[], LinearSolver] = MultifrontalSolver,
     say: Callable[[str], None] | None = None,
 ) -> ErrorEstimate:
     """The discretisation error of clamp forces, probe currents, Ry and Rc of a recorded state.

@@ -13,7 +13,8 @@ from circuittex.geometry.mesh import FibrilMesh, Floats
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.mech.equilibrium import minimise
-from circuittex.mech.linear import LinearSolver, best_solver
+from circuittex.mech.linear import LinearSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.space import BeamSpace, beam_space
 
 
@@ -70,7 +71,7 @@ def relax(
         space.vector(start),
         mass=beam.mass,
         fixed=space.fixed,
-        solver=solver if solver is not None else best_solver(),
+        solver=solver if solver is not None else MultifrontalSolver(),
         before=space.vector(before) if before is not None and moved else None,
         tolerance=design.numerics.tolerance,
         max_iterations=design.numerics.max_iterations,

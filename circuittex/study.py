@@ -26,7 +26,8 @@ from circuittex.folder import (
 from circuittex.geometry.weave import build_mesh
 from circuittex.lock import locked
 from circuittex.mech.configuration import initial_configuration
-from circuittex.mech.linear import LinearSolver, best_solver
+from circuittex.mech.linear import LinearSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.plan import RELAXED, plan
 from circuittex.record import reach
 from circuittex.results import Record, Study
@@ -44,7 +45,7 @@ def run_study(
     fresh: bool = False,
     error_estimate: bool = False,
     workers: int | None = None,
-    solver: Callable[[], LinearSolver] = best_solver,
+    solver: Callable[[], LinearSolver] = MultifrontalSolver,
     progress: Say | None = None,
 ) -> Study:
     """Compute a design: the relaxed state and every state of its loading paths.

@@ -77,7 +77,7 @@ ALLOWED: dict[str, set[str]] = {
         *{"store", "study", "summary"},
     },
     "study": {
-        *{"design", "geometry.weave", "mech.configuration", "mech.linear"},
+        *{"design", "geometry.weave", "mech.configuration", "mech.linear", "mech.multifrontal"},
         *{"discretisation", "error_estimate", "folder", "lock", "plan", "record", "results", "schedule", "workers"},
     },
 }

@@ -12,8 +12,9 @@ from beams import dense
 
 from circuittex.geometry.mesh import Floats
 from circuittex.mech.coupled import Coupled, pair_of_entry
-from circuittex.mech.linear import LinearSolver, PardisoSolver, best_solver
+from circuittex.mech.linear import LinearSolver
 from circuittex.mech.multifrontal import MultifrontalSolver
+from circuittex.mech.pardiso import PardisoSolver
 from circuittex.mech.pattern import Pattern, build_pattern, diagonal
 
 
@@ -136,11 +137,10 @@ def test_singular_matrix_is_none(make: Callable[[], LinearSolver]) -> None:
         assert_solves(solver, pattern, data, 5)
 
 
-def test_best_solver_is_the_first_that_can_be_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A wheel that is missing, or whose own libraries are, is passed over."""
-    assert best_solver().name == ("pardiso" if has("pypardiso") else "multifrontal")
+def test_pardiso_that_is_not_installed_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pypardiso", None)  # makes its import raise ImportError
-    assert best_solver().name == "multifrontal"
+    with pytest.raises(ImportError, match="pypardiso"):
+        PardisoSolver()
 
 
 @pytest.mark.parametrize("make", SOLVERS)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from circuittex import schedule
 from circuittex.errors import CircuittexError, ConvergenceError
 from circuittex.frozen import same
-from circuittex.mech.linear import best_solver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.plan import plan
 from circuittex.results import Record, Study
 from circuittex.schedule import compute
@@ -64,7 +64,7 @@ def run(known: list[str], size: int, pick: Callable[[int], int], fails: tuple[st
         patch.setattr(schedule, "reach", canned.reach)
         patch.setattr(schedule, "record_state", canned.record_state)
         try:
-            result: Any = compute(start, Shuffled(size, pick), best_solver, keep)
+            result: Any = compute(start, Shuffled(size, pick), MultifrontalSolver, keep)
         except CircuittexError as error:
             result = error
     assert len(canned.reached) == len(set(canned.reached))

@@ -1,4 +1,4 @@
-"""Direct solvers for the tangent, behind one small interface that also answers "is it positive definite?".
+"""What the equilibrium iteration asks of a direct solver: solutions, and "is the tangent positive definite?".
 
 A solver's `factor` takes the pattern and the values of a symmetric matrix and returns a function that
 solves with it, or None where a pivot is not positive. The symbolic analysis is kept while the same `Pattern` object
@@ -7,91 +7,19 @@ comes back and its values couple no node pair that was not coupled before (`circ
 
 from __future__ import annotations
 
-import os
-import sys
-import warnings
 from collections.abc import Callable
-from typing import Any, Protocol
-
-import numpy as np
-import scipy.sparse as sp
+from typing import Protocol
 
 from circuittex.geometry.mesh import Floats
-from circuittex.mech.coupled import Coupled
-from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import Pattern
 
 Solve = Callable[[Floats], Floats]
 
 
 class LinearSolver(Protocol):
-    """What the equilibrium iteration asks of a solver."""
+    """A direct solver: `circuittex.mech.multifrontal` is the one by default."""
 
     name: str
 
     def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
         """A function that solves with the matrix, or None if it is not positive definite."""
-
-
-def best_solver() -> LinearSolver:
-    """The fastest installed: PARDISO, of the `fast` extra, or else the one that needs no extra."""
-    try:
-        return PardisoSolver()
-    except (ImportError, OSError):  # not installed, or a library of its own is missing
-        return MultifrontalSolver()
-
-
-class PardisoSolver:
-    """Intel MKL's PARDISO through pypardiso: Cholesky, its symbolic analysis kept while the same pairs are coupled."""
-
-    name = "pardiso"
-    _CHOLESKY, _ANALYSE, _FACTOR, _SOLVE, _RELEASE = 2, 11, 22, 33, -1
-    _NOT_POSITIVE = -4
-    _SETTINGS = ((1, 1), (2, 2), (34, 2))
-    """Places and values of iparm: own settings, METIS ordering, no refinement; and the work divided as for two threads
-    whatever their number, so that the result has the same bits on any number."""
-
-    def __init__(self) -> None:
-        self._coupled = Coupled()
-        self._matrix: Any = None
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # pypardiso warns about its own optional dependencies
-            import pypardiso
-
-        self._error = pypardiso.pardiso_wrapper.PyPardisoError
-        self._pardiso = pypardiso.PyPardisoSolver(mtype=self._CHOLESKY)
-        # What took a search of the whole environment is found at once the next time, by worker processes as well.
-        os.environ.setdefault("PYPARDISO_MKL_RT", self._pardiso.libmkl._name)
-        for place, value in self._SETTINGS:
-            self._pardiso.set_iparm(place, value)
-
-    def _call(self, phase: int, b: Floats) -> Floats:
-        self._pardiso.set_phase(phase)
-        return np.asarray(self._pardiso._call_pardiso(self._matrix, b))
-
-    def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
-        """A function that solves with the matrix (until the next call), or None if it is not positive definite."""
-        nothing = np.zeros(pattern.n_dofs)
-        if self._coupled.renew(pattern, data):
-            self._release()
-            entries = self._coupled.entries
-            parts = data[entries], pattern.indices[entries], self._coupled.start()
-            self._matrix = sp.csr_matrix(parts, shape=(pattern.n_dofs, pattern.n_dofs))
-            self._call(self._ANALYSE, nothing)
-        self._matrix.data = data[self._coupled.entries]
-        try:
-            self._call(self._FACTOR, nothing)
-        except self._error as error:
-            if error.value == self._NOT_POSITIVE:
-                return None
-            raise
-        return lambda b: self._call(self._SOLVE, b)
-
-    def _release(self) -> None:
-        if self._matrix is not None:
-            self._call(self._RELEASE, np.zeros(self._matrix.shape[0]))
-            self._matrix = None
-
-    def __del__(self) -> None:
-        if not sys.is_finalizing():  # at exit the system takes the memory back
-            self._release()

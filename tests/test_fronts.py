@@ -76,11 +76,13 @@ def test_unmerged_fronts_hold_the_fill_and_nothing_else(pattern: Pattern) -> Non
 
 
 @settings(deadline=None, max_examples=60)
-@given(patterns(), st.sampled_from([0.0, 300.0, 3e4, fronts.FRONT]))
-def test_fronts_fit_together(pattern: Pattern, cost: float) -> None:
-    """Each unknown is eliminated once, each border lies in the front above, each entry has a place of its own."""
+@given(patterns(), st.sampled_from([0.0, 300.0, 3e4, fronts.FRONT]), st.sampled_from([0.0, 0.1, 0.5, 1.0]))
+def test_fronts_fit_together(pattern: Pattern, cost: float, share: float) -> None:
+    """Each unknown is eliminated once, each border lies in the front above, each entry has a place of its own, and
+    subtrees hold all that is below their fronts."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fronts, "FRONT", cost)
+        patch.setattr(fronts, "SHARE", share)
         analysis = analyse(pattern)
     n = pattern.n_dofs
     assert np.array_equal(np.sort(analysis.order), np.arange(n))
@@ -110,6 +112,16 @@ def test_fronts_fit_together(pattern: Pattern, cost: float) -> None:
         else:
             assert front.above == -1
     assert at == analysis.size
+    alone = sorted(k for subtree in analysis.subtrees for k in subtree)
+    assert len(set(alone)) == len(alone)
+    for k, front in enumerate(analysis.fronts):
+        assert front.below == tuple(c for c, other in enumerate(analysis.fronts) if other.above == k)
+        assert analysis.waiting[k] == len(front.below)
+        if k not in alone:  # it comes after those below it, of which there are some
+            assert front.below
+        elif front.below:
+            (subtree,) = [subtree for subtree in analysis.subtrees if k in subtree]
+            assert subtree.start <= front.below[0]
     expected = dense(pattern, np.arange(1.0, pattern.nnz + 1))[np.ix_(analysis.order, analysis.order)]
     assert np.array_equal(table + np.triu(table, 1).T, expected)
 

@@ -161,6 +161,40 @@ def test_one_front_is_the_dense_factor() -> None:
     assert border.size == 0
 
 
+@pytest.mark.parametrize("threads", [2, 5])
+def test_threads_change_no_bit(threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many fronts and subtrees of one or two of them, again and again: whoever is first, sums keep their order."""
+    monkeypatch.setattr(fronts, "SHARE", 1e-3)
+    pattern = grid(10)
+    good, b = random_values(pattern, 7, 0.1), np.ones(pattern.n_dofs)
+    bad = good.copy()
+    bad[diagonal(pattern)[450]] = -1.0
+    found = []
+    for count in (1, *[threads] * 20):
+        monkeypatch.setattr(multifrontal, "cores", lambda count=count: count)
+        solver = solver_for(pattern, 300.0)
+        assert solver._analysis is not None
+        assert len(solver._analysis.subtrees) > 10
+        assert solver.factor(pattern, bad) is None
+        solve = solver.factor(pattern, good)
+        assert solve is not None
+        found.append(solve(b).tobytes())
+    assert len(set(found)) == 1
+
+
+def test_an_error_in_a_thread_comes_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_memory(*_: object) -> None:
+        raise MemoryError
+
+    solver, pattern = MultifrontalSolver(), grid(8)
+    monkeypatch.setattr(fronts, "SHARE", 1e-3)
+    monkeypatch.setattr(fronts, "FRONT", 0.0)
+    monkeypatch.setattr(multifrontal, "cores", lambda: 2)
+    monkeypatch.setattr(multifrontal, "_add", no_memory)
+    with pytest.raises(MemoryError):
+        solver.factor(pattern, random_values(pattern, 8, 0.1))
+
+
 def test_the_same_matrix_gives_the_same_bits() -> None:
     """Also after another matrix and another pattern, and in another solver."""
     pattern, other = grid(8), grid(5)

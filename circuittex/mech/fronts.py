@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from circuittex.compiled import compiled
 from circuittex.frozen import frozen
-from circuittex.geometry.mesh import Ints
+from circuittex.geometry.mesh import Floats, Ints
 from circuittex.mech.dissection import dissect
 from circuittex.mech.pattern import Pattern, ranges
 from circuittex.mech.space import DOFS
@@ -29,6 +29,8 @@ POSITION = 3
 WORTHWHILE = 1.2
 """Parts are dissected anew where their last order takes this times the operations that it took when it was made, since
 pairs have come to be coupled across its separators."""
+SHARE = 1 / 16
+"""Part of the work that threads take at a time: enough pieces for several threads, and few of them to share out."""
 FRONT, ADDITION = 1e6, 10.0
 """What a front costs besides its elimination, in floating-point operations: in any case, and for each value that it
 hands to the front above. Two become one where that adds fewer."""
@@ -48,6 +50,8 @@ class Front:
     """where in the factor its values begin: (p, p) of the pivots, then (p, b) of the border, row after row."""
     above: int
     """number of the front above; -1 where there is no border."""
+    below: tuple[int, ...]
+    """numbers of the fronts right below, rising."""
     places: Ints
     """(b,) where those of the border are in the front above, its pivots first."""
     runs: Ints
@@ -70,6 +74,10 @@ class Analysis:
     """the parts by their turns, as dissection gave them."""
     least: float
     """floating-point operations that a factorisation took when the parts were dissected."""
+    subtrees: tuple[range, ...]
+    """fronts to eliminate one after another, side by side with those of other ranges; the last is above all others."""
+    waiting: tuple[int, ...]
+    """of each front above these: how many are right below it."""
 
 
 class _Tree(NamedTuple):
@@ -134,6 +142,9 @@ def analyse(pattern: Pattern, coupled: NDArray[np.bool_], entries: Ints, last: A
     breaks[cut[:-1][b > 0]] = True
     runs = np.flatnonzero(breaks)
     run_cut = np.searchsorted(runs, cut)
+    below: list[list[int]] = [[] for _ in p]
+    for k in np.flatnonzero(above >= 0).tolist():
+        below[above[k]].append(k)
     size = p * (p + b)
     start = np.cumsum(size) - size
     fronts = tuple(
@@ -143,6 +154,7 @@ def analyse(pattern: Pattern, coupled: NDArray[np.bool_], entries: Ints, last: A
             border=border[cut[k] : cut[k + 1]],
             start=int(start[k]),
             above=int(above[k]),
+            below=tuple(below[k]),
             places=places[cut[k] : cut[k + 1]],
             runs=np.append(runs[run_cut[k] : run_cut[k + 1]], cut[k + 1]) - cut[k],
         )
@@ -150,7 +162,31 @@ def analyse(pattern: Pattern, coupled: NDArray[np.bool_], entries: Ints, last: A
     )
     target = np.empty(len(entries), dtype=np.int64)
     _locate(entries, pattern.indptr, pattern.indices, place, front_of, first, p, cut, border, start, target)
-    return Analysis(order=order, fronts=fronts, target=target, size=int(size.sum()), parts=tree.parts, least=least)
+    subtrees = _subtrees(above, _work(p.astype(float), b.astype(float)))
+    return Analysis(
+        order=order,
+        fronts=fronts,
+        target=target,
+        size=int(size.sum()),
+        parts=tree.parts,
+        least=least,
+        subtrees=subtrees,
+        waiting=tuple(map(len, below)),
+    )
+
+
+def _subtrees(above: Ints, work: Floats) -> tuple[range, ...]:
+    """The largest subtrees that hold at most a part `SHARE` of the work each, and single fronts that hold more and have
+    none below. Fronts below one another are numbered one after another."""
+    total, count = work.copy(), np.ones(len(above), dtype=np.int64)
+    for k in range(len(above)):
+        if above[k] >= 0:
+            total[above[k]] += total[k]
+            count[above[k]] += count[k]
+    small = total <= SHARE * work.sum()
+    top = small & ~np.where(above >= 0, small[above], False)
+    top |= ~small & (count == 1)
+    return tuple(range(int(k - count[k] + 1), int(k + 1)) for k in np.flatnonzero(top))
 
 
 @compiled

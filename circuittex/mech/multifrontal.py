@@ -3,21 +3,26 @@
 Each front of `circuittex.mech.fronts` holds the rows of the factor U, K = U^T U, that belong to its pivots: their
 *triangle* (p, p), and their *border* (p, b). They come as rows of the matrix and of what the fronts below add to it.
 What the elimination subtracts from the other unknowns of the border, the *update* (b, b), goes to the front above.
-LAPACK does the dense work, on a single thread: so the result has the same bits on any number of threads.
+LAPACK does the dense work of a front on a single thread, and the updates are added in a fixed order: so the result has
+the same bits on any number of threads, which share the fronts.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from threading import Lock
 from typing import Any
 
 import numpy as np
-from scipy.linalg.blas import dsyrk, dtrsm, dtrsv
-from scipy.linalg.lapack import dpotrf
+from scipy.linalg.blas import dtrsv
 from threadpoolctl import ThreadpoolController
 
-from circuittex.compiled import compiled
+from circuittex.compiled import compiled, cores
 from circuittex.geometry.mesh import Floats
+from circuittex.mech.blas import cholesky, solve_border, subtract_products
 from circuittex.mech.coupled import Coupled
 from circuittex.mech.fronts import Analysis, Front, analyse
 from circuittex.mech.pattern import Pattern
@@ -66,21 +71,63 @@ class MultifrontalSolver:
         return self._values[start : start + rows * columns].reshape(rows, columns)
 
     def _eliminate(self) -> bool:
-        """Turn the rows of the matrix into rows of the factor; False where a pivot is not positive."""
-        below: list[list[tuple[Front, Floats]]] = [[] for _ in self._blocks]
-        for k, (front, triangle, border) in enumerate(self._blocks):
-            update = np.zeros((border.shape[1], border.shape[1]))
-            for part, values in below[k]:
-                _add(values, part.places, part.runs, triangle, border, update)
-            below[k].clear()  # gives the memory back
-            # What is upper by rows is lower by columns, the order of LAPACK: the transposed views are changed in place.
-            _, info = dpotrf(triangle.T, lower=1, clean=0, overwrite_a=1)
-            if info != 0 or not triangle[-1, -1] > 0.0:  # what is not a number spreads to the last pivot
-                return False
-            if front.above >= 0:
-                dtrsm(1.0, triangle.T, border.T, side=1, lower=1, trans_a=1, overwrite_b=1)
-                dsyrk(-1.0, border.T, beta=1.0, c=update.T, lower=1, overwrite_c=1)
-                below[front.above].append((front, update))
+        """Turn the rows of the matrix into rows of the factor; False where a pivot is not positive.
+
+        Each thread takes subtrees of fronts. Who is the last to finish below a front goes on with that front.
+        """
+        assert self._analysis is not None, "factor comes first"
+        subtrees, waiting = deque(self._analysis.subtrees), list(self._analysis.waiting)
+        updates: dict[int, Floats] = {}
+        lock = Lock()
+        refused: list[int] = []
+
+        def work() -> None:
+            while subtrees and not refused:
+                with suppress(IndexError):  # another thread has taken the last one
+                    climb(subtrees.popleft())
+
+        def climb(subtree: range) -> None:
+            k = subtree.start
+            while not refused:
+                if not self._eliminate_front(k, updates):
+                    refused.append(k)
+                    return
+                if k + 1 in subtree:
+                    k += 1
+                    continue
+                k = self._blocks[k][0].above
+                if k < 0:
+                    return
+                with lock:
+                    waiting[k] -= 1
+                    if waiting[k] > 0:
+                        return
+
+        threads = min(cores(), len(subtrees))
+        if threads == 1:
+            work()
+        else:
+            with ThreadPoolExecutor(threads) as pool:
+                for done in [pool.submit(work) for _ in range(threads)]:
+                    done.result()
+        return not refused
+
+    def _eliminate_front(self, k: int, updates: dict[int, Floats]) -> bool:
+        """Eliminate the pivots of a front, with the updates of those below it; False where one is not positive.
+
+        What it subtracts from its border joins the updates.
+        """
+        front, triangle, border = self._blocks[k]
+        update = np.zeros((border.shape[1], border.shape[1]))
+        for child in front.below:
+            part = self._blocks[child][0]
+            _add(updates.pop(child), part.places, part.runs, triangle, border, update)
+        if not cholesky(triangle):
+            return False
+        if front.above >= 0:
+            solve_border(triangle, border)
+            subtract_products(border, update)
+            updates[k] = update
         return True
 
     def _solve(self, b: Floats) -> Floats:

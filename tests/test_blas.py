@@ -1,0 +1,62 @@
+"""The dense routines against NumPy, and whether they let other threads run meanwhile."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from circuittex.geometry.mesh import Floats
+from circuittex.mech.blas import cholesky, solve_border, subtract_products
+
+ROUND_OFF = 1e-12
+"""Relative: a few hundred operations for each value, and condition numbers of some hundred."""
+
+
+def stiff(p: int) -> Floats:
+    """A positive definite matrix (p, p)."""
+    A = np.random.default_rng(p).normal(size=(p, p))
+    return np.asarray(A @ A.T + p * np.eye(p))
+
+
+@pytest.mark.parametrize(("p", "b"), [(1, 1), (3, 7), (40, 9), (70, 70)])
+def test_parts_of_the_factor(p: int, b: int) -> None:
+    K, rng = stiff(p), np.random.default_rng(b)
+    border, update = rng.normal(size=(p, b)), rng.normal(size=(b, b))
+    U = np.linalg.cholesky(K).T
+    expected = np.linalg.solve(U.T, border)
+    products = update - expected.T @ expected
+    triangle, below = K.copy(), np.tril(update, -1)
+    assert cholesky(triangle)
+    solve_border(triangle, border)
+    subtract_products(border, update)
+    for found, wanted in ((np.triu(triangle), U), (border, expected), (np.triu(update), np.triu(products))):
+        assert np.abs(found - wanted).max() <= ROUND_OFF * np.abs(wanted).max()
+    assert np.array_equal(np.tril(update, -1), below)
+
+
+@pytest.mark.parametrize("value", [-1.0, 0.0, np.nan])
+@pytest.mark.parametrize("at", [0, 5, 9])
+def test_a_pivot_that_is_not_positive(value: float, at: int) -> None:
+    K = np.diag(np.arange(1.0, 11.0))
+    K[at, at] = value
+    assert not cholesky(K)
+
+
+def test_other_threads_run_meanwhile() -> None:
+    """While a call works for some tenths of a second this thread goes on; with the lock held it would rest as long."""
+    K, took = stiff(3000), []
+
+    def work() -> None:
+        clock = time.perf_counter()
+        cholesky(K)
+        took.append(time.perf_counter() - clock)
+
+    thread, longest, last = threading.Thread(target=work), 0.0, time.perf_counter()
+    thread.start()
+    while thread.is_alive():
+        now = time.perf_counter()
+        longest, last = max(longest, now - last), now
+    assert longest < 0.5 * took[0]

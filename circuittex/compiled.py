@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
-from typing import TypeVar
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from typing import Any, TypeVar
 
 from numba import config, njit
 
@@ -30,3 +32,12 @@ def available_cores() -> int:
 def cores() -> int:
     """How many threads may run compiled functions: NUMBA_NUM_THREADS, and no more than this process has cores."""
     return min(available_cores(), int(config.NUMBA_NUM_THREADS))
+
+
+def side_by_side(kernel: Callable[..., object], edges: Sequence[int], *arguments: Any) -> None:
+    """Call kernel(first, last, *arguments) for each range between two edges, all at the same time."""
+    if len(edges) == 2:
+        kernel(*edges, *arguments)
+        return
+    with ThreadPoolExecutor(len(edges) - 1) as pool:
+        list(pool.map(lambda piece: kernel(*piece, *arguments), pairwise(edges)))

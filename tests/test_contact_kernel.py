@@ -85,6 +85,19 @@ def test_tangent_is_the_slope_of_the_gradient(mesh: FibrilMesh) -> None:
         assert np.abs((ahead - behind) / (2 * step) - product).max() < 2e-8 * np.abs(product).max()
 
 
+@pytest.mark.parametrize("mesh", CASES)
+@pytest.mark.parametrize("threads", [2, 3, 7])
+def test_threads_change_no_bit(mesh: FibrilMesh, threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("circuittex.contact.penalty.WORTH_A_THREAD", 1)
+    found = []
+    for cores in (1, threads):
+        monkeypatch.setattr("circuittex.contact.penalty.cores", lambda cores=cores: cores)
+        term, q = contact_term(mesh, penalty=P)
+        _, gradient, _, data = assembled(term, q)
+        found.append((gradient.tobytes(), data.tobytes()))
+    assert found[0] == found[1]
+
+
 @given(seed=st.integers(0, 2**32 - 1), order=st.sampled_from([1, 2]))
 def test_forces_and_moments_sum_to_zero(seed: int, order: int) -> None:
     mesh = tangle(seed, fibrils=5, elements=6 // order, order=order, radius=0.3)

@@ -42,6 +42,8 @@ def _couple(r: Any, wa: int, wb: int, c: Any, cs: Any, css: Any, w: Any, n: Any,
 
 @compiled
 def add_contacts(
+    first_node: int,
+    last_node: int,
     r: Any,
     basis: Any,
     window_a: Any,
@@ -61,7 +63,9 @@ def add_contacts(
     data: Any,
     softening: Any,
 ) -> None:
-    """Add the gradient and the tangent's upper triangle of every contact (C) in place.
+    """Add the gradient and the tangent's upper triangle of every contact (C) in place, in the rows of some nodes.
+
+    These are first_node to last_node, the latter not included: threads that share out the nodes share no row.
 
     The tangent's first part, P w_q c_i c_j n n^T, goes to data; the rest, by which the contact force turns as
     fibrils slide, goes to softening.
@@ -71,6 +75,10 @@ def add_contacts(
     c, cs, css = np.zeros(8), np.zeros(8), np.zeros(8)
     w, n, spread, turned = np.empty((8, 3)), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     for q in range(overlap.shape[0]):
+        # The lower window first: so the second node of each pair is the higher, a column right of the diagonal.
+        low, high = min(window_a[q], window_b[q]), max(window_a[q], window_b[q])
+        if (low + 4 <= first_node or low >= last_node) and (high + 4 <= first_node or high >= last_node):
+            continue
         weights(basis[kind_a[q]], t_a[q], 0, c[:4])
         for order, out in ((0, c), (1, cs), (2, css)):
             weights(basis[kind_b[q]], t_b[q], order, out[4:])
@@ -83,12 +91,10 @@ def add_contacts(
                 spread[k, m] = stiff * n[k] * n[m]
                 turned[k, m] = lean * (n[k] * n[m] - (k == m))
         over_m *= lean
-        # The lower window first: so the second node of each pair is the higher, a column right of the diagonal.
-        low, high = min(window_a[q], window_b[q]), max(window_a[q], window_b[q])
         first, second = (0, 4) if low == window_a[q] else (4, 0)
         for i in range(8):
             mine, node = (first + i, low + i) if i < 4 else (second + i - 4, high + i - 4)
-            if c[mine] == 0.0 and cs[mine] == 0.0:
+            if not first_node <= node < last_node or (c[mine] == 0.0 and cs[mine] == 0.0):
                 continue
             across = find_neighbour(start, neighbour, node, high) if i < 4 else 0
             for k in range(3):

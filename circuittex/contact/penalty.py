@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from circuittex.compiled import cores
+from circuittex.compiled import cores, side_by_side
 from circuittex.contact.closest import find_contacts
 from circuittex.contact.curve import BASIS, CurveTable, bezier, curve_table
 from circuittex.contact.kernels import add_contacts
@@ -15,6 +15,8 @@ from circuittex.frozen import frozen
 from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
 from circuittex.mech.pattern import Pattern
 
+WORTH_A_THREAD = 2000
+"""Contacts that are worth a thread of their own."""
 CHUNKS = 16
 """Candidates are searched in this many pieces, whatever the number of threads."""
 
@@ -115,13 +117,16 @@ class PenaltyContact:
         k = np.minimum(found.position_b.astype(np.int64), last - 1)
         b = table.first_interval[found.fibril_b] + k
         weight = self.weight[table.fibril[found.interval_a]]
-        add_contacts(
+        window_a, window_b = table.window[found.interval_a], table.window[b]
+        side_by_side(
+            add_contacts,
+            self._shares(window_a, window_b),
             self.positions(q),
             BASIS,
-            table.window[found.interval_a],
+            window_a,
             table.kind[found.interval_a],
             found.t_a,
-            table.window[b],
+            window_b,
             table.kind[b],
             found.position_b - k,
             (found.position_b <= 0) | (found.position_b >= last),
@@ -136,6 +141,16 @@ class PenaltyContact:
             softening,
         )
         return float(0.5 * self.penalty * np.sum(weight * found.overlap**2))
+
+    def _shares(self, window_a: Ints, window_b: Ints) -> list[int]:
+        """Nodes that part the rows of the matrix into as many pieces as there are cores for, of much the same work."""
+        n = self.mesh.n_nodes
+        pieces = min(cores(), 1 + len(window_a) // WORTH_A_THREAD)
+        # The rows of the lower window hold the blocks of both, those of the higher only its own.
+        low, high = np.minimum(window_a, window_b), np.maximum(window_a, window_b)
+        work = np.cumsum(3 * np.bincount(low, minlength=n) + np.bincount(high, minlength=n))
+        inner = np.searchsorted(work, work[-1] * np.arange(1, pieces) / pieces) + 1
+        return [0, *np.minimum(inner, n).tolist(), n]
 
 
 def _search(mesh: FibrilMesh, table: CurveTable, points: Floats, candidates: Candidates, r: Floats) -> Touching:

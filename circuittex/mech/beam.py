@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from circuittex.compiled import cores
+from circuittex.compiled import cores, side_by_side
 from circuittex.geometry.mesh import Floats, Ints
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.kernels import N_STRAINS, beam_energy, section_force
@@ -104,11 +102,7 @@ class Beam:
         first = self.space.mesh.first_element
         pieces = min(cores(), 1 + int(first[-1]) // WORTH_A_THREAD)
         edges = np.unique(first[np.linspace(0, len(first) - 1, pieces + 1).astype(int)]).tolist()
-        if len(edges) == 2:
-            kernel(*edges, *arguments)
-            return
-        with ThreadPoolExecutor(len(edges) - 1) as pool:
-            list(pool.map(lambda piece: kernel(*piece, *arguments), pairwise(edges)))
+        side_by_side(kernel, edges, *arguments)
 
     def energy(self, q: Floats) -> float:
         """Elastic energy, N mm; infinite where a section has turned inside out."""

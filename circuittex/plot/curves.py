@@ -145,7 +145,7 @@ def _finish(figure: Figure, study: Study, names: Sequence[str]) -> None:
             Line2D([], [], marker="o", linestyle="", color=GREY, markerfacecolor=face, markersize=4.5, label=label)
             for face, label in ((GREY, "strain growing"), ("white", "on the way back"))
         ]
-    if study.errors:
+    if any(np.isfinite(quantity.absolute) for error in study.errors for quantity in error.quantities):
         keys.append(error_bar_key())
     if keys:
         figure.legend(handles=keys, loc="outside lower center", ncols=3 if figure.get_figwidth() > 6.0 else 2)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+import circuittex.mech.elimination_tree as elimination_tree
 import circuittex.mech.fronts as fronts
 from circuittex.design import plain_weave
 from circuittex.geometry.mesh import Ints
@@ -41,8 +42,8 @@ def analyse(pattern: Pattern) -> Analysis:
 
 def merge_nothing(patch: pytest.MonkeyPatch) -> None:
     """Fronts cost nothing, so that merging two of them never pays."""
-    patch.setattr(fronts, "FRONT", 0.0)
-    patch.setattr(fronts, "ADDITION", 0.0)
+    patch.setattr(elimination_tree, "FRONT", 0.0)
+    patch.setattr(elimination_tree, "ADDITION", 0.0)
 
 
 def filled(pattern: Pattern, order: Ints) -> NDArray[np.bool_]:
@@ -76,13 +77,13 @@ def test_unmerged_fronts_hold_the_fill_and_nothing_else(pattern: Pattern) -> Non
 
 
 @settings(deadline=None, max_examples=60)
-@given(patterns(), st.sampled_from([0.0, 300.0, 3e4, fronts.FRONT]), st.sampled_from([0.0, 0.1, 0.5, 1.0]))
+@given(patterns(), st.sampled_from([0.0, 300.0, 3e4, elimination_tree.FRONT]), st.sampled_from([0.0, 0.1, 0.5, 1.0]))
 def test_fronts_fit_together(pattern: Pattern, cost: float, share: float) -> None:
     """Each unknown is eliminated once, each border lies in the front above, each entry has a place of its own, and
     subtrees hold all that is below their fronts."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fronts, "FRONT", cost)
-        patch.setattr(fronts, "SHARE", share)
+        patch.setattr(elimination_tree, "FRONT", cost)
+        patch.setattr(elimination_tree, "SHARE", share)
         analysis = analyse(pattern)
     n = pattern.n_dofs
     assert np.array_equal(np.sort(analysis.order), np.arange(n))

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from test_fronts import patterns
 
+import circuittex.mech.elimination_tree as elimination_tree
 import circuittex.mech.fronts as fronts
 import circuittex.mech.multifrontal as multifrontal
 from circuittex.geometry.mesh import Floats, Ints
@@ -17,7 +18,7 @@ from circuittex.mech.coupled import pair_of_entry
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import Pattern, build_pattern, diagonal
 
-costs = st.sampled_from([0.0, 300.0, 3e4, fronts.FRONT])
+costs = st.sampled_from([0.0, 300.0, 3e4, elimination_tree.FRONT])
 """From one part a front to one front for all that is connected."""
 seeds = st.integers(0, 2**32 - 1)
 EPSILON = float(np.finfo(float).eps)
@@ -44,7 +45,7 @@ def solver_for(pattern: Pattern, cost: float) -> MultifrontalSolver:
     solver, unit = MultifrontalSolver(), np.full(pattern.nnz, 1e-9)
     unit[diagonal(pattern)] = 1.0
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fronts, "FRONT", cost)
+        patch.setattr(elimination_tree, "FRONT", cost)
         assert solver.factor(pattern, unit) is not None
     return solver
 
@@ -83,7 +84,7 @@ def test_an_unknown_without_stiffness_or_not_a_number_is_refused(pattern: Patter
     assert solver.factor(pattern, data) is None
 
 
-@pytest.mark.parametrize("cost", [0.0, 3e4, fronts.FRONT, np.inf])
+@pytest.mark.parametrize("cost", [0.0, 3e4, elimination_tree.FRONT, np.inf])
 @pytest.mark.parametrize("graded", [False, True])
 def test_backward_error_is_round_off_whatever_the_scales(cost: float, graded: bool) -> None:
     """900 unknowns, alike or in units that differ by up to 1e12: |Ax - b| is within round-off of |A||x| row by row.
@@ -164,7 +165,7 @@ def test_one_front_is_the_dense_factor() -> None:
 @pytest.mark.parametrize("threads", [2, 5])
 def test_threads_change_no_bit(threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Many fronts and subtrees of one or two of them, again and again: whoever is first, sums keep their order."""
-    monkeypatch.setattr(fronts, "SHARE", 1e-3)
+    monkeypatch.setattr(elimination_tree, "SHARE", 1e-3)
     pattern = grid(10)
     good, b = random_values(pattern, 7, 0.1), np.ones(pattern.n_dofs)
     bad = good.copy()
@@ -187,8 +188,8 @@ def test_an_error_in_a_thread_comes_out(monkeypatch: pytest.MonkeyPatch) -> None
         raise MemoryError
 
     solver, pattern = MultifrontalSolver(), grid(8)
-    monkeypatch.setattr(fronts, "SHARE", 1e-3)
-    monkeypatch.setattr(fronts, "FRONT", 0.0)
+    monkeypatch.setattr(elimination_tree, "SHARE", 1e-3)
+    monkeypatch.setattr(elimination_tree, "FRONT", 0.0)
     monkeypatch.setattr(multifrontal, "cores", lambda: 2)
     monkeypatch.setattr(multifrontal, "_add", no_memory)
     with pytest.raises(MemoryError):

@@ -11,7 +11,7 @@ the position of node a, part 2 a + 1 its directors.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,6 +21,7 @@ from circuittex.compiled import compiled
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import Floats, Ints
 from circuittex.mech.dissection import dissect
+from circuittex.mech.elimination_tree import EliminationTree, elimination_tree, subtrees, work
 from circuittex.mech.pattern import Pattern, ranges
 from circuittex.mech.space import DOFS
 
@@ -29,11 +30,6 @@ POSITION = 3
 WORTHWHILE = 1.2
 """Parts are dissected anew where their last order takes this times the operations that it took when it was made, since
 pairs have come to be coupled across its separators."""
-SHARE = 1 / 16
-"""Part of the work that threads take at a time: enough pieces for several threads, and few of them to share out."""
-FRONT, ADDITION = 1e6, 10.0
-"""What a front costs besides its elimination, in floating-point operations: in any case, and for each value that it
-hands to the front above. Two become one where that adds fewer."""
 
 
 @frozen
@@ -80,23 +76,6 @@ class Analysis:
     """of each front above these: how many are right below it."""
 
 
-class _Tree(NamedTuple):
-    """Fronts as sets of parts, the latter numbered by their turns."""
-
-    parts: Ints
-    """the part of each turn."""
-    begin: Ints
-    """where in `later` those of each part begin."""
-    later: Ints
-    """the later parts to which each is coupled when its turn comes."""
-    tops: Ints
-    """the part that gives each front its border."""
-    front: Ints
-    """the front of each part."""
-    operations: float
-    """floating-point operations of a factorisation."""
-
-
 def analyse(pattern: Pattern, coupled: NDArray[np.bool_], entries: Ints, last: Analysis | None = None) -> Analysis:
     """The order of elimination and the fronts of a matrix in which some node pairs are coupled, the others not.
 
@@ -106,14 +85,7 @@ def analyse(pattern: Pattern, coupled: NDArray[np.bool_], entries: Ints, last: A
     """
     graph = _graph(pattern, coupled)
     width = np.tile([POSITION, DOFS - POSITION], graph.shape[0] // 2)
-    tree = None
-    if last is not None and len(last.parts) == len(width):
-        tree, least = _tree(graph, width, last.parts), last.least
-        if tree.operations > WORTHWHILE * least:
-            tree = None
-    if tree is None:
-        tree = _tree(graph, width, dissect(graph, width, pattern.position.repeat(2, axis=0)))
-        least = tree.operations
+    tree, least = _ordered(graph, width, pattern.position, last)
     parts, begin, later, tops, front_of_turn = tree.parts, tree.begin, tree.later, tree.tops, tree.front
 
     # Parts by their fronts, then their unknowns: the order of elimination.
@@ -162,7 +134,6 @@ def analyse(pattern: Pattern, coupled: NDArray[np.bool_], entries: Ints, last: A
     )
     target = np.empty(len(entries), dtype=np.int64)
     _locate(entries, pattern.indptr, pattern.indices, place, front_of, first, p, cut, border, start, target)
-    subtrees = _subtrees(above, _work(p.astype(float), b.astype(float)))
     return Analysis(
         order=order,
         fronts=fronts,
@@ -170,23 +141,21 @@ def analyse(pattern: Pattern, coupled: NDArray[np.bool_], entries: Ints, last: A
         size=int(size.sum()),
         parts=tree.parts,
         least=least,
-        subtrees=subtrees,
+        subtrees=subtrees(above, work(p.astype(float), b.astype(float))),
         waiting=tuple(map(len, below)),
     )
 
 
-def _subtrees(above: Ints, work: Floats) -> tuple[range, ...]:
-    """The largest subtrees that hold at most a part `SHARE` of the work each, and single fronts that hold more and have
-    none below. Fronts below one another are numbered one after another."""
-    total, count = work.copy(), np.ones(len(above), dtype=np.int64)
-    for k in range(len(above)):
-        if above[k] >= 0:
-            total[above[k]] += total[k]
-            count[above[k]] += count[k]
-    small = total <= SHARE * work.sum()
-    top = small & ~np.where(above >= 0, small[above], False)
-    top |= ~small & (count == 1)
-    return tuple(range(int(k - count[k] + 1), int(k + 1)) for k in np.flatnonzero(top))
+def _ordered(
+    graph: sp.csr_array, width: Ints, position: Floats, last: Analysis | None
+) -> tuple[EliminationTree, float]:
+    """The elimination tree in the last order or else a new one, and the operations when that order was made."""
+    if last is not None and len(last.parts) == len(width):
+        tree = elimination_tree(graph, width, last.parts)
+        if tree.operations <= WORTHWHILE * last.least:
+            return tree, last.least
+    tree = elimination_tree(graph, width, dissect(graph, width, position.repeat(2, axis=0)))
+    return tree, tree.operations
 
 
 @compiled
@@ -249,110 +218,3 @@ def _graph(pattern: Pattern, coupled: NDArray[np.bool_]) -> sp.csr_array:
     j = np.concatenate([2 * node + 1, 2 * b, 2 * d + 1, 2 * d, 2 * d + 1])
     ends = np.concatenate([i, j]), np.concatenate([j, i])
     return sp.csr_array((np.ones(2 * len(i)), ends), shape=(2 * n, 2 * n))
-
-
-def _tree(graph: sp.csr_array, width: Ints, parts: Ints) -> _Tree:
-    """The fronts that make the least work of the parts in this order."""
-    turned = graph[parts][:, parts]
-    n, width = len(parts), width[parts]
-    begin = np.zeros(n + 1, dtype=np.int64)
-    later = _eliminate(turned.indptr.astype(np.int64), turned.indices.astype(np.int64), begin)
-    some = np.diff(begin) > 0
-    above = np.full(n, -1)
-    above[some] = np.minimum.reduceat(later, begin[:-1][some])
-    p, b = width.astype(float), np.diff(np.concatenate([[0], np.cumsum(width[later])])[begin]).astype(float)
-    taken, tops = _take_in(above, p, b, FRONT, ADDITION)
-    front = np.empty(n, dtype=np.int64)
-    front[tops] = np.arange(len(tops))
-    for c in np.flatnonzero(taken != np.arange(n))[::-1]:  # what takes a part in comes after it
-        front[c] = front[taken[c]]
-    return _Tree(parts, begin, later, tops, front, float(_work(p[tops], b[tops]).sum()))
-
-
-@compiled
-def _eliminate(indptr: Any, indices: Any, begin: Any) -> Any:
-    """Eliminate part after part: what is coupled to one comes to be coupled to the next of these."""
-    n = len(indptr) - 1
-    later, seen = np.empty(4 * len(indices), np.int64), np.full(n, -1)
-    below, sibling = np.full(n, -1), np.full(n, -1)  # the parts whose next one is this: a linked list
-    end = 0
-    for k in range(n):
-        if end + n > len(later):
-            longer = np.empty(2 * (end + n), np.int64)
-            longer[:end] = later[:end]
-            later = longer
-        seen[k], nearest = k, n
-        for at in range(indptr[k], indptr[k + 1]):
-            j = indices[at]
-            if j > k and seen[j] != k:
-                seen[j], later[end], nearest, end = k, j, min(nearest, j), end + 1
-        child = below[k]
-        while child >= 0:
-            for at in range(begin[child], begin[child + 1]):
-                j = later[at]
-                if seen[j] != k:
-                    seen[j], later[end], nearest, end = k, j, min(nearest, j), end + 1
-            child = sibling[child]
-        begin[k + 1] = end
-        if nearest < n:
-            sibling[k], below[nearest] = below[nearest], k
-    return later[:end]
-
-
-@compiled
-def _take_in(above: Any, p: Any, b: Any, front: float, addition: float) -> Any:
-    """Which part takes each part in, itself where none does, and all those in an order of elimination.
-
-    At first every part is a front. Each takes in those below it while that saves time, the largest first, and those
-    below a front come just before it, which keeps few of them waiting.
-    """
-    n = above.shape[0]
-    taken, below = np.arange(n), np.empty(n, np.int64)
-    head, tail, sibling = np.full(n, -1), np.full(n, -1), np.full(n, -1)  # lists of those below
-    for k in range(n):
-        count, c = 0, head[k]
-        while c >= 0:
-            at = count
-            while at > 0 and b[below[at - 1]] < b[c]:
-                below[at] = below[at - 1]
-                at -= 1
-            below[at], count, c = c, count + 1, sibling[c]
-        head[k] = tail[k] = -1
-        for m in range(count):
-            c = below[m]
-            first, last, sibling[c] = c, c, -1
-            apart = _work(p[k], b[k]) + _work(p[c], b[c]) + front + addition * b[c] ** 2
-            if _work(p[k] + p[c], b[k]) < apart:
-                taken[c], first, last = k, head[c], tail[c]
-                p[k] += p[c]
-            if first >= 0:
-                if head[k] < 0:
-                    head[k] = first
-                else:
-                    sibling[tail[k]] = first
-                tail[k] = last
-        up = above[k]
-        if up >= 0:
-            if head[up] < 0:
-                head[up] = k
-            else:
-                sibling[tail[up]] = k
-            tail[up] = k
-    order, end, waiting = np.empty(n, np.int64), n, 0
-    for k in range(n):
-        if above[k] < 0:
-            below[waiting], waiting = k, waiting + 1
-    while waiting > 0:
-        waiting -= 1
-        k = below[waiting]
-        end -= 1
-        order[end], c = k, head[k]
-        while c >= 0:
-            below[waiting], waiting, c = c, waiting + 1, sibling[c]
-    return taken, order[end:]
-
-
-@compiled
-def _work(p: Any, b: Any) -> Any:
-    """Operations that eliminate p unknowns of p + b: one multiplication and addition for each entry and pivot."""
-    return ((p + b) ** 3 - b**3) / 3

@@ -10,7 +10,6 @@ parts of itself. A state where they are not small is a bifurcation: which branch
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +19,7 @@ from circuittex.contact.extract import contacts_of
 from circuittex.design import Design
 from circuittex.fields import solve_probes
 from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
+from circuittex.geometry.order import reordered
 from circuittex.increment import advance
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.linear import LinearSolver
@@ -32,26 +32,6 @@ from circuittex.store import load_study
 
 SOLVERS: dict[str, Callable[[], LinearSolver]] = {solver.name: solver for solver in (MultifrontalSolver, PardisoSolver)}
 HEAD = ["state", "iterations", "recorded", "clamp force", "probe current"]
-
-
-def shuffled(mesh: FibrilMesh, order: Ints) -> tuple[FibrilMesh, Ints]:
-    """The same fibrils in another order, and the old number of each of its nodes."""
-    nodes = np.concatenate([np.arange(mesh.first_node[f], mesh.first_node[f + 1]) for f in order])
-    counts, elements = np.diff(mesh.first_node)[order], np.diff(mesh.first_element)[order]
-    old = np.concatenate([np.arange(mesh.first_element[f], mesh.first_element[f + 1]) for f in order])
-    place = np.argsort(nodes)
-    tables = "yarn length radius youngs_modulus poisson_ratio density electrical_conductivity thermal_conductivity"
-    other = replace(
-        mesh,
-        position=mesh.position[nodes],
-        directors=mesh.directors[nodes],
-        xi=mesh.xi[nodes],
-        elements=place[mesh.elements[old]],
-        first_node=np.concatenate([[0], np.cumsum(counts)]),
-        first_element=np.concatenate([[0], np.cumsum(elements)]),
-        **{name: getattr(mesh, name)[order] for name in tables.split()},
-    )
-    return other, nodes
 
 
 def again(design: Design, mesh: FibrilMesh, start: Configuration, step: Step, solver: LinearSolver) -> Equilibrium:
@@ -87,7 +67,7 @@ def main() -> None:
 
     def tables() -> list[Table]:
         own = np.arange(mesh.n_nodes)
-        other, nodes = shuffled(mesh, np.random.default_rng(seed).permutation(mesh.n_fibrils))
+        other, nodes = reordered(mesh, np.random.default_rng(seed).permutation(mesh.n_fibrils))
         title = f"{study.design.name}: fibrils shuffled (seed {seed}), {MultifrontalSolver.name}:"
         made = [Table(title, HEAD, rows(study, other, nodes, MultifrontalSolver))]
         same = {f"{study.design.name}: {name}:": rows(study, mesh, own, SOLVERS[name]) for name in options.solvers}

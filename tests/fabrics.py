@@ -12,6 +12,7 @@ from scipy.interpolate import CubicHermiteSpline
 from circuittex.contact.penalty import PenaltyContact
 from circuittex.design import Design, plain_weave
 from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
+from circuittex.geometry.order import reordered
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.space import beam_space
@@ -123,26 +124,13 @@ def renumbered(mesh: FibrilMesh, order: Sequence[int] | Ints, flip: Sequence[int
     Returns the mesh and, for each of its nodes, the node's number in the old one. The first director changes sign
     along with the tangent, so that the frames stay right-handed.
     """
-    place = [np.arange(mesh.first_node[f], mesh.first_node[f + 1])[:: -1 if f in flip else 1] for f in order]
-    node = np.concatenate(place)
-    counts, elements = np.diff(mesh.first_node)[list(order)], np.diff(mesh.first_element)[list(order)]
-    first = np.concatenate([[0], np.cumsum(counts)])
-    within = [mesh.order * np.arange(n)[:, None] + np.arange(mesh.order + 1) for n in elements]
+    other, node = reordered(mesh, np.asarray(order))
+    for number, fibril in enumerate(order):
+        nodes = slice(other.first_node[number], other.first_node[number + 1])
+        node[nodes] = node[nodes][:: -1 if fibril in flip else 1]
     directors = mesh.directors[node].copy()
-    directors[np.isin(np.repeat(list(order), counts), list(flip)), 0] *= -1
-    tables = "yarn length radius youngs_modulus poisson_ratio density electrical_conductivity thermal_conductivity"
-    per_fibril = {name: getattr(mesh, name)[list(order)] for name in tables.split()}
-    other = replace(
-        mesh,
-        position=mesh.position[node],
-        directors=directors,
-        xi=np.concatenate([np.linspace(0.0, mesh.length[f], n) for f, n in zip(order, counts, strict=True)]),
-        elements=np.concatenate([first[f] + within[f] for f in range(len(within))]),
-        first_node=first,
-        first_element=np.concatenate([[0], np.cumsum(elements)]),
-        **per_fibril,
-    )
-    return other, node
+    directors[np.isin(mesh.node_fibril[node], list(flip)), 0] *= -1
+    return replace(other, position=mesh.position[node], directors=directors), node
 
 
 def mirrored(mesh: FibrilMesh, axis: int) -> FibrilMesh:

@@ -11,12 +11,9 @@ from types import ModuleType
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from fabrics import renumbered
 
 from circuittex.circuit import reduced_circuit
 from circuittex.design import Design, plain_weave
-from circuittex.frozen import same
-from circuittex.geometry.weave import build_mesh
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 SCRIPTS = [
@@ -137,16 +134,6 @@ def test_newton_reports_every_part_and_solver() -> None:
     assert "contact points" in parts.title
     assert {newton.CLOSEST, newton.ENERGY, newton.BEAM, newton.CONTACT, newton.SOLVE} < {row[0] for row in parts.rows}
     assert [row[0] for row in solvers.rows] == [solver.name for solver in newton.installed()]
-
-
-def test_shuffled_fibrils_are_the_same_fibrils() -> None:
-    """Against the renumbering that the physics tests use."""
-    mesh = build_mesh(tiny())
-    order = np.random.default_rng(0).permutation(mesh.n_fibrils)
-    other, nodes = script("invariance").shuffled(mesh, order)
-    expected, expected_nodes = renumbered(mesh, order)
-    assert np.array_equal(nodes, expected_nodes)
-    assert same(other, expected)
 
 
 def test_stopwatch_misses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -70,6 +70,7 @@ def _run(options: argparse.Namespace) -> int:
             options.out,
             fresh=options.fresh,
             error_estimate=options.error_estimate,
+            branches=options.branches,
             workers=options.workers,
             progress=progress,
         )

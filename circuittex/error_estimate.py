@@ -8,22 +8,21 @@ from math import nan
 
 import numpy as np
 
-from circuittex.contact.extract import contacts_of
 from circuittex.design import Design
 from circuittex.discretisation import ErrorEstimate, QuantityError
-from circuittex.errors import CircuittexError, ConvergenceError, DesignError
-from circuittex.fields import solve_probes
-from circuittex.fit import Fit, fit_network
+from circuittex.errors import ConvergenceError, DesignError
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import FibrilMesh, Floats
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.mech.multifrontal import MultifrontalSolver
-from circuittex.relaxation import clamp_force, relax
+from circuittex.outcome import Outcome
+from circuittex.record import outcome_of
+from circuittex.relaxation import relax
 from circuittex.results import Record, Study
 from circuittex.transfer import transfer
-from circuittex.workers import Computers
+from circuittex.workers import Job
 
 VARIANTS = ("half as many elements", "twice as many elements", "twice as many contact points")
 """How the numerics of a design are varied, in the order of `variants`."""
@@ -93,7 +92,7 @@ def estimate_error(
         if say is not None:
             say(f"{record.name}: error estimate, {words}")
         repeats.append(_repeat(other, mesh, record.configuration, free, solver()))
-    own = _values(record.clamp_force, record.currents, record.fit)
+    own = _values(record.outcome)
     rows = zip(_names(design), own, *(repeat.values for repeat in repeats), strict=True)
     elements, points = design.numerics.elements, design.numerics.contact_points
     return ErrorEstimate(
@@ -113,34 +112,14 @@ def without_estimate(study: Study) -> tuple[Record, ...]:
     return tuple(record for record in last.values() if record.name not in known)
 
 
-def estimate_errors(
-    study: Study,
-    computers: Computers,
-    solver: Callable[[], LinearSolver],
-    keep: Callable[[Study, ErrorEstimate], Study],
-) -> Study:
-    """The study with an estimate for each state that `without_estimate` names; those that it has stay.
+def estimates(study: Study, solver: Callable[[], LinearSolver]) -> list[Job]:
+    """The tasks that estimate the errors of each state that `without_estimate` names.
 
-    `keep` adds an estimate to the study; it is called for each new one as it comes. In the study they are in the order
-    of their states.
-
-    Raises, before anything is computed, the `DesignError` of `variants`; the error of an estimate that fails.
+    Raises `DesignError` as `variants` does.
     """
     variants(study.design)
-    waiting = list(without_estimate(study))
-    running = 0
-    while waiting or running:
-        while waiting and running < computers.size:
-            record = waiting.pop(0)
-            computers.submit(record.name, estimate_error, study.design, study.mesh, record, solver)
-            running += 1
-        _, result = computers.next()
-        running -= 1
-        if isinstance(result, CircuittexError):
-            raise result
-        study = keep(study, result)
-    rank = {record.name: number for number, record in enumerate(study.records)}
-    return replace(study, errors=tuple(sorted(study.errors, key=lambda estimate: rank[estimate.state])))
+    arguments = study.design, study.mesh
+    return [(record.name, estimate_error, (*arguments, record, solver)) for record in without_estimate(study)]
 
 
 def _repeat(design: Design, mesh: FibrilMesh, state: Configuration, free: str, solver: LinearSolver) -> _Repeat:
@@ -150,12 +129,9 @@ def _repeat(design: Design, mesh: FibrilMesh, state: Configuration, free: str, s
         found = relax(other, design, transfer(state, mesh, other), free=free, solver=solver)
     except ConvergenceError as error:
         return _Repeat(np.full(len(_names(design)), nan), nan, str(error))
-    contacts = contacts_of(design, other, found.configuration)
-    fields = solve_probes(contacts, design.terminals, design.probes, contact_heat=design.electrical.contact_heat)
     back = transfer(found.configuration, other, mesh)
     moved = float(np.linalg.norm(back.r - state.r, axis=1).max())
-    currents = [float(field.currents[0]) for field in fields]
-    return _Repeat(_values(clamp_force(other, found.reaction), currents, fit_network(currents, design)), moved, "")
+    return _Repeat(_values(outcome_of(design, other, found)), moved, "")
 
 
 def _names(design: Design) -> tuple[tuple[str, str], ...]:
@@ -164,9 +140,10 @@ def _names(design: Design) -> tuple[tuple[str, str], ...]:
     return ("Fx warp", "N"), ("Fy weft", "N"), *currents, ("Ry", "ohm"), ("Rc", "ohm")
 
 
-def _values(force: Floats, currents: Sequence[float], fit: Fit) -> Floats:
+def _values(outcome: Outcome) -> Floats:
     """(n,) the quantities: clamp force of the warp along x and of the weft along y, probe currents, Ry, Rc."""
-    return np.array([force[0, 0], force[1, 1], *currents, fit.Ry, fit.Rc])
+    force = outcome.clamp_force
+    return np.array([force[0, 0], force[1, 1], *outcome.currents, outcome.Ry, outcome.Rc])
 
 
 def _warnings(mesh: FibrilMesh, repeats: Sequence[_Repeat]) -> Iterator[str]:

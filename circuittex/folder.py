@@ -6,13 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from circuittex.atomic import PARTIAL
-from circuittex.discretisation import ErrorEstimate
 from circuittex.errors import FolderError, StoreError
 from circuittex.export import netlist_files, simplified, write_netlists
 from circuittex.plot import FIGURES
 from circuittex.report import write_report
-from circuittex.results import Record, Study
-from circuittex.store import append_error, append_record, load_study, write_study_start
+from circuittex.results import Finding, Record, Study, with_finding
+from circuittex.store import append_finding, append_record, load_study, write_study_start
 from circuittex.summary import write_summary
 from circuittex.vtu import write_collections, write_vtu
 
@@ -83,11 +82,11 @@ def keep_record(folder: Path, study: Study, record: Record) -> Study:
     return replace(study, records=(*study.records, record))
 
 
-def keep_error(folder: Path, study: Study, estimate: ErrorEstimate) -> Study:
-    """The study with the error estimate of one more state, which is in the HDF5 file then; an older report goes."""
+def keep_finding(folder: Path, study: Study, finding: Finding) -> Study:
+    """The study with one more finding about a state, which is in the HDF5 file then; an older report goes."""
     (folder / REPORT).unlink(missing_ok=True)
-    append_error(folder / RESULTS, estimate)
-    return replace(study, errors=(*study.errors, estimate))
+    append_finding(folder / RESULTS, finding)
+    return with_finding(study, finding)
 
 
 def write_state(folder: Path, study: Study, record: Record) -> None:

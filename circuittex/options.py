@@ -99,6 +99,13 @@ def _add_run(commands: Commands) -> None:
         "twice as many contact points. A run made without gets them when it is repeated with this option",
     )
     parser.add_argument(
+        "--branches",
+        action="store_true",
+        help="reach every recorded state once more, with the fibrils in another order, and say whether clamp forces "
+        "and currents stay the same or round-off chooses among branches; this takes as long as the relaxations did. A "
+        "run made without gets the checks when it is repeated with this option",
+    )
+    parser.add_argument(
         "--workers",
         metavar="N",
         type=int,

@@ -13,11 +13,13 @@ from circuittex.export import detailed_file, simplified
 from circuittex.fields import solve_probes
 from circuittex.fit import fit_network
 from circuittex.geometry.levels import levels
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.increment import Increment, advance
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.linear import LinearSolver
+from circuittex.outcome import Outcome
 from circuittex.plan import Step
-from circuittex.relaxation import clamp_force, relax
+from circuittex.relaxation import Equilibrium, clamp_force, relax
 from circuittex.results import Record, Study
 from circuittex.verify import field_convergence, verify
 from circuittex.verify_reduced import verify_reduced
@@ -96,6 +98,15 @@ def record_state(study: Study, step: Step, reached: Increment, say: Callable[[st
         levels=levels(mesh, equilibrium.configuration.r, *centre_crossing(design)),
         netlist=f"netlists/{detailed_file(step.name)}",
     )
+
+
+def outcome_of(design: Design, mesh: FibrilMesh, equilibrium: Equilibrium) -> Outcome:
+    """The numbers of an equilibrium and nothing else, for one that is not recorded."""
+    contacts = contacts_of(design, mesh, equilibrium.configuration)
+    fields = solve_probes(contacts, design.terminals, design.probes, contact_heat=design.electrical.contact_heat)
+    currents = tuple(float(field.currents[0]) for field in fields)
+    fit = fit_network(currents, design)
+    return Outcome(clamp_force(mesh, equilibrium.reaction), currents, fit.Ry, fit.Rc, equilibrium.energy)
 
 
 def centre_crossing(design: Design) -> tuple[int, float]:

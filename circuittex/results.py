@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
+from circuittex.bifurcation import BranchCheck
 from circuittex.contact.state import ContactState
 from circuittex.design import Design
 from circuittex.discretisation import ErrorEstimate
@@ -12,6 +16,7 @@ from circuittex.fit import Fit
 from circuittex.frozen import frozen
 from circuittex.geometry.mesh import FibrilMesh, Floats
 from circuittex.mech.configuration import Configuration
+from circuittex.outcome import Outcome
 from circuittex.verify import Verification
 
 
@@ -78,6 +83,11 @@ class Record:
         return tuple(float(f.currents[0]) for f in self.fields)
 
     @property
+    def outcome(self) -> Outcome:
+        """The numbers by which equilibria are told apart."""
+        return Outcome(self.clamp_force, self.currents, self.fit.Ry, self.fit.Rc, self.energy)
+
+    @property
     def peak_temperature(self) -> float:
         """Largest temperature rise over all probes, K."""
         return max((f.peak_temperature for f in self.fields), default=float("nan"))
@@ -101,7 +111,32 @@ class Study:
     """The recorded states: the relaxed one, then path by path in the order of the design."""
     errors: tuple[ErrorEstimate, ...] = ()
     """Estimated discretisation errors, in the order of their states; not every state has one."""
+    branches: tuple[BranchCheck, ...] = ()
+    """Whether round-off chose the branch, in the order of the states; not every state has been checked."""
 
     def error_of(self, state: str) -> ErrorEstimate | None:
         """The error estimate of a state, if it has one."""
         return next((estimate for estimate in self.errors if estimate.state == state), None)
+
+    def check_of(self, state: str) -> BranchCheck | None:
+        """The check of a state's branch, if there is one."""
+        return next((check for check in self.branches if check.state == state), None)
+
+    def bifurcation_of(self, state: str) -> BranchCheck | None:
+        """The check of a state's branch, if it found another one."""
+        return next((check for check in self.branches if check.state == state and check.bifurcation), None)
+
+
+Finding = ErrorEstimate | BranchCheck
+"""What is found out about a recorded state after it was recorded, and names it."""
+FINDINGS: dict[type[Finding], str] = {ErrorEstimate: "errors", BranchCheck: "branches"}
+"""Kind of finding -> the field of a `Study` that holds them."""
+
+
+def with_finding(study: Study, finding: Finding) -> Study:
+    """The study with one more finding, in the order of its states."""
+    field = FINDINGS[type(finding)]
+    place = {record.name: number for number, record in enumerate(study.records)}
+    found: list[Finding] = [*getattr(study, field), finding]
+    changed: dict[str, Any] = {field: tuple(sorted(found, key=lambda each: place[each.state]))}
+    return replace(study, **changed)

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from circuittex import __version__
+from circuittex.branch_check import branch_checks
 from circuittex.compiled import available_cores
 from circuittex.design import Design, design_hash
-from circuittex.discretisation import ErrorEstimate
-from circuittex.error_estimate import estimate_errors, variants, without_estimate
+from circuittex.error_estimate import estimates, variants
 from circuittex.errors import DesignError, StoreError
 from circuittex.folder import (
     complete,
-    keep_error,
+    keep_finding,
     keep_record,
     needs_report,
     open_study,
@@ -30,9 +30,9 @@ from circuittex.mech.linear import LinearSolver
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.plan import RELAXED, plan
 from circuittex.record import reach
-from circuittex.results import Record, Study
+from circuittex.results import Finding, Record, Study, with_finding
 from circuittex.schedule import compute
-from circuittex.workers import Here, Pool
+from circuittex.workers import Here, Job, Pool, completed
 
 Say = Callable[[str], None]
 Keep = Callable[[Study, Record], Study]
@@ -44,6 +44,7 @@ def run_study(
     *,
     fresh: bool = False,
     error_estimate: bool = False,
+    branches: bool = False,
     workers: int | None = None,
     solver: Callable[[], LinearSolver] = MultifrontalSolver,
     progress: Say | None = None,
@@ -61,7 +62,9 @@ def run_study(
     relaxation. `progress` is told in words what is being done; a line break ends what is worth keeping on the screen.
 
     With `error_estimate` the relaxed state and the last of each loading path get estimates of their discretisation
-    errors, as far as they have none, each from three more relaxations (`estimate_error`).
+    errors, as far as they have none, each from three more relaxations (`estimate_error`). With `branches` every state
+    is reached once more, with the fibrils in another order, to see whether round-off chooses its branch
+    (`check_branch`), as far as it has not been checked. Both are kept one by one as the states are.
 
     Raises `ConvergenceError` where equilibria are not found, once the other paths are done; `FolderError` where the
     folder cannot be used; `StoreError` where it cannot be written, on a full disk for example.
@@ -79,14 +82,19 @@ def run_study(
         initial=initial_configuration(mesh),
         records=(),
     )
+
+    def jobs(found: Study) -> Sequence[Job]:
+        estimated = estimates(found, solver) if error_estimate else []
+        return [*estimated, *(branch_checks(found, solver) if branches else [])]
+
     if out is None:
         study = _compute(study, count, solver, say, _with)
-        return _estimate(study, count, solver, say, _with_error) if error_estimate else study
+        return _examine(study, jobs(study), count, say, with_finding)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     with locked(folder):
         study = open_study(folder, study, fresh=fresh)
-        return _in_folder(folder, study, count, solver, say, error_estimate)
+        return _in_folder(folder, study, count, solver, say, jobs)
 
 
 def _in_folder(
@@ -95,7 +103,7 @@ def _in_folder(
     workers: int,
     solver: Callable[[], LinearSolver],
     say: Say,
-    error_estimate: bool,
+    jobs: Callable[[Study], Sequence[Job]],
 ) -> Study:
     """Complete the study and everything in its folder."""
     total, kept = len(plan(study.design)), len(study.records)
@@ -112,8 +120,7 @@ def _in_folder(
 
     try:
         study = _compute(study, workers, solver, say, keep)
-        if error_estimate:
-            study = _estimate(study, workers, solver, say, partial(keep_error, folder))
+        study = _examine(study, jobs(study), workers, say, partial(keep_finding, folder))
         if needs_report(folder):
             say("figures and report")
         complete(folder, study)
@@ -141,19 +148,16 @@ def _compute(study: Study, workers: int, solver: Callable[[], LinearSolver], say
         pool.close()
 
 
-def _estimate(
-    study: Study,
-    workers: int,
-    solver: Callable[[], LinearSolver],
-    say: Say,
-    keep: Callable[[Study, ErrorEstimate], Study],
+def _examine(
+    study: Study, jobs: Sequence[Job], workers: int, say: Say, keep: Callable[[Study, Finding], Study]
 ) -> Study:
-    """The study with the error estimates that it lacks."""
-    workers = min(workers, len(without_estimate(study)))
-    if workers <= 1:
-        return estimate_errors(study, Here(say), solver, keep)
-    with closing(Pool(workers, threads=max(1, available_cores() // workers), say=say)) as pool:
-        return estimate_errors(study, pool, solver, keep)
+    """The study with what the jobs find about its states."""
+    workers = min(workers, len(jobs))
+    pool = Pool(workers, threads=max(1, available_cores() // workers), say=say) if workers > 1 else Here(say)
+    with closing(pool) as computers:
+        for finding in completed(computers, jobs):
+            study = keep(study, finding)
+    return study
 
 
 def _workers(asked: int | None) -> int:
@@ -166,11 +170,6 @@ def _workers(asked: int | None) -> int:
 def _with(study: Study, record: Record) -> Study:
     """The study with one more record."""
     return replace(study, records=(*study.records, record))
-
-
-def _with_error(study: Study, estimate: ErrorEstimate) -> Study:
-    """The study with one more error estimate."""
-    return replace(study, errors=(*study.errors, estimate))
 
 
 def _say_nothing(_: str) -> None:

@@ -44,6 +44,13 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
         the state on the coarse and the fine mesh and with more points, ``warnings``, and ``quantities``: ``name``,
         ``unit``, ``value``, ``error`` and its parts ``mesh_error`` and ``contact_error``, ``relative_error``, observed
         ``order``, and the values ``coarse``, ``fine`` and ``more_points``
+    ``branch_check``
+        null, or what came out when the state was reached once more with the fibrils in another order: ``verdict``,
+        ``bifurcation``: whether it is one, ``clamp_force_difference`` and ``current_difference``: to the state,
+        relative, ``energy_difference_N_mm``, ``moved_mm``: the largest distance of a node from its place in the state,
+        ``settled_difference``: the larger relative difference when both were relaxed further (null where they were
+        not), ``trouble``: why something did not converge, and the other branch: ``clamp_force_N``, ``currents_A``,
+        ``Ry_ohm``, ``Rc_ohm``, ``stored_energy_N_mm``
     ``verification``
         ``routes``: the routes that answered; ``max_voltage_difference_V``: the largest difference of two routes in a
         node voltage, V per volt of the probe; ``max_current_difference``: in a terminal current, relative;
@@ -66,8 +73,10 @@ from typing import Any
 import numpy as np
 
 from circuittex.atomic import write_text
+from circuittex.bifurcation import BranchCheck, branch_statement, current_difference, force_difference
+from circuittex.bifurcation import difference as difference_between
 from circuittex.discretisation import ErrorEstimate
-from circuittex.geometry.mesh import FibrilMesh
+from circuittex.geometry.mesh import FibrilMesh, Floats
 from circuittex.results import Record, Study
 from circuittex.verify import AGREEMENT
 from circuittex.work import EnergyBalance, step_balances
@@ -87,7 +96,7 @@ def summary(study: Study) -> dict[str, Any]:
             "parameters": study.design,
             "probes": [probe.name for probe in study.design.probes],
             "insulated_Ry_ohm": insulated_resistance(study.mesh),
-            "states": [_state(record, steps.get(record.name), study.error_of(record.name)) for record in study.records],
+            "states": [_state(study, record, steps.get(record.name)) for record in study.records],
         }
     )
     return content
@@ -101,7 +110,7 @@ def write_summary(path: str | Path, study: Study) -> None:
 
 def table(study: Study) -> str:
     """The closing table of a run: one line for each state, with its estimated error where there is one, then what the
-    study took and whether ngspice confirmed it. A blank line parts the loading paths."""
+    study took, what the branch checks found, and whether ngspice confirmed it. A blank line parts the loading paths."""
     head = ["state", "Fx warp N", "Fy weft N", *(f"{probe.name} A" for probe in study.design.probes)]
     rows = [[*head, "Ry ohm", "Rc ohm", "iterations", "routes differ"]]
     path = ""
@@ -122,7 +131,9 @@ def table(study: Study) -> str:
         for row in rows
     ]
     warnings = [f"Error estimate of {error.state}: {text}." for error in study.errors for text in error.warnings]
-    return "\n".join([*lines, "", *effort(study), *warnings, *ngspice_statement(study)])
+    return "\n".join(
+        [*lines, "", *effort(study), *branch_statement(study.branches), *warnings, *ngspice_statement(study)]
+    )
 
 
 def effort(study: Study) -> tuple[str, ...]:
@@ -222,8 +233,9 @@ def insulated_resistance(mesh: FibrilMesh) -> float:
     return float(np.mean(1.0 / (conductance * np.maximum(crossings, 1))[conducts])) if conducts.any() else math.inf
 
 
-def _state(record: Record, step: EnergyBalance | None, error: ErrorEstimate | None) -> dict[str, Any]:
+def _state(study: Study, record: Record, step: EnergyBalance | None) -> dict[str, Any]:
     verification = record.verification
+    error, check = study.error_of(record.name), study.check_of(record.name)
     return {
         "name": record.name,
         "path": record.path,
@@ -232,7 +244,7 @@ def _state(record: Record, step: EnergyBalance | None, error: ErrorEstimate | No
         "residual_N": record.residual,
         "newton_iterations": record.iterations,
         "parts": record.parts,
-        "clamp_force_N": {"x": record.clamp_force[0], "y": record.clamp_force[1]},
+        "clamp_force_N": _by_axis(record.clamp_force),
         "stored_energy_N_mm": record.energy,
         "clamp_work_N_mm": None if step is None else step.work.item(),
         "stored_energy_change_N_mm": None if step is None else step.stored.item(),
@@ -247,6 +259,7 @@ def _state(record: Record, step: EnergyBalance | None, error: ErrorEstimate | No
         "levels": record.levels,
         "netlist": record.netlist,
         "error_estimate": None if error is None else _error_estimate(error),
+        "branch_check": None if check is None else _branch_check(check),
         "verification": {
             "routes": verification.routes,
             "max_voltage_difference_V": verification.max_voltage_difference,
@@ -286,6 +299,30 @@ def _error_estimate(error: ErrorEstimate) -> dict[str, Any]:
             for quantity in error.quantities
         ],
     }
+
+
+def _branch_check(check: BranchCheck) -> dict[str, Any]:
+    again = check.again
+    return {
+        "verdict": str(check.verdict),
+        "bifurcation": check.bifurcation,
+        "clamp_force_difference": force_difference(check.recorded, again),
+        "current_difference": current_difference(check.recorded, again),
+        "energy_difference_N_mm": again.energy - check.recorded.energy,
+        "moved_mm": check.moved,
+        "settled_difference": difference_between(*check.settled) if check.settled else None,
+        "trouble": check.trouble,
+        "clamp_force_N": _by_axis(again.clamp_force),
+        "currents_A": again.currents,
+        "Ry_ohm": again.Ry,
+        "Rc_ohm": again.Rc,
+        "stored_energy_N_mm": again.energy,
+    }
+
+
+def _by_axis(clamp_force: Floats) -> dict[str, Floats]:
+    """(2, 3) forces of the clamps on the warp and on the weft."""
+    return {"x": clamp_force[0], "y": clamp_force[1]}
 
 
 def _plain(value: Any) -> Any:

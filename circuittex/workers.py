@@ -19,7 +19,7 @@ import threading
 import time
 import traceback
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, BinaryIO, Protocol
 
@@ -36,6 +36,8 @@ SERVE = "from circuittex.workers import serve; serve()"
 Say = Callable[[str], None]
 Task = Callable[..., Any]
 """Called with its arguments and, as the last one, a `Say`; for a `Pool` a function that pickle finds by its name."""
+Job = tuple[str, Task, tuple[object, ...]]
+"""What a task is about, the task, and its arguments."""
 
 
 class Computers(Protocol):
@@ -51,6 +53,24 @@ class Computers(Protocol):
 
     def close(self) -> None:
         """End at once what is still going on."""
+
+
+def completed(computers: Computers, jobs: Sequence[Job]) -> Iterator[Any]:
+    """The results of jobs that do not depend on one another, as they come.
+
+    Raises the `CircuittexError` of a job that fails.
+    """
+    waiting, running = deque(jobs), 0
+    while waiting or running:
+        while waiting and running < computers.size:
+            key, task, arguments = waiting.popleft()
+            computers.submit(key, task, *arguments)
+            running += 1
+        _, result = computers.next()
+        running -= 1
+        if isinstance(result, CircuittexError):
+            raise result
+        yield result
 
 
 class Here:

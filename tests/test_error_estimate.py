@@ -18,7 +18,7 @@ from circuittex.cli import main
 from circuittex.contact.extract import contacts_of
 from circuittex.design import Design, starter, uniaxial
 from circuittex.discretisation import ErrorEstimate
-from circuittex.error_estimate import estimate_error, estimate_errors, variants
+from circuittex.error_estimate import estimate_error, estimates, variants
 from circuittex.errors import CircuitError, ConvergenceError, DesignError
 from circuittex.fields import solve_probes
 from circuittex.fit import fit_network
@@ -27,10 +27,11 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation import Equilibrium, clamp_force, relax
-from circuittex.results import Record, Study
+from circuittex.results import Record, Study, with_finding
 from circuittex.store import load_study
 from circuittex.study import run_study
 from circuittex.transfer import transfer
+from circuittex.workers import completed
 
 Cell = tuple[Design, FibrilMesh, Record]
 
@@ -280,13 +281,10 @@ class LastFirst:
 
 
 def test_estimates_are_in_the_order_of_their_states(canned: Study) -> None:
-    kept = []
-
-    def keep(study: Study, estimate: ErrorEstimate) -> Study:
+    kept, study = [], canned
+    for estimate in completed(LastFirst(), estimates(canned, MultifrontalSolver)):
         kept.append(estimate.state)
-        return replace(study, errors=(*study.errors, estimate))
-
-    study = estimate_errors(canned, LastFirst(), MultifrontalSolver, keep)
+        study = with_finding(study, estimate)
     assert kept == ["stretch-0.05", "shear-0.05", "relaxed"]
     assert [estimate.state for estimate in study.errors] == ESTIMATED
 

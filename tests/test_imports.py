@@ -18,7 +18,10 @@ SHARED = {"frozen", "errors", "compiled", "atomic"}
 # Stage -> the stages and modules it may import, besides SHARED and itself (docs/architecture.md). A dotted name
 # allows one module of a stage only; without a dot the whole stage is allowed.
 STATE = {"contact.state", "geometry.mesh"}
-RESULT_TYPES = {*STATE, "design", "discretisation", "fields", "fit", "verify", "mech.configuration"}
+RESULT_TYPES = {
+    *{*STATE, "design", "fields", "fit", "verify", "mech.configuration"},
+    *{"outcome", "discretisation", "bifurcation"},
+}
 ROUTES = {"fields", "circuit", "nodal", "netlist", "ngspice"}
 OUTPUTS = {"store", "summary", "plot", "report", "vtu"}
 ALLOWED: dict[str, set[str]] = {
@@ -48,10 +51,16 @@ ALLOWED: dict[str, set[str]] = {
     "verify_reduced": {"circuit", "design", "fit", "netlist", "ngspice"},
     "export": {*STATE, "circuit", "contact.merge", "design", "fit", "netlist"},
     "discretisation": {"geometry.mesh"},
+    "outcome": {"geometry.mesh"},
+    "bifurcation": {"outcome"},
     "transfer": {"geometry.mesh", "mech.configuration"},
     "error_estimate": {
-        *{"design", "geometry", "mech", "contact", "relaxation", "fields", "fit", "results"},
-        *{"discretisation", "transfer", "workers"},
+        *{"design", "geometry", "mech", "relaxation", "results", "discretisation", "outcome", "record", "transfer"},
+        "workers",
+    },
+    "branch_check": {
+        *{"design", "geometry", "mech", "relaxation", "results", "bifurcation", "outcome", "plan", "record"},
+        "workers",
     },
     "results": RESULT_TYPES,
     "store": {*RESULT_TYPES, "results"},
@@ -68,9 +77,9 @@ ALLOWED: dict[str, set[str]] = {
     "plan": {"design", "export", "geometry.mesh"},
     "record": {
         *{"design", "geometry", "mech", "contact", "relaxation", "increment", "fields", "fit", "verify"},
-        *{"verify_reduced", "export", "results", "plan"},
+        *{"verify_reduced", "export", "results", "outcome", "plan"},
     },
-    "folder": {"discretisation", "export", "results", *OUTPUTS},
+    "folder": {"export", "results", *OUTPUTS},
     "schedule": {"mech.configuration", "mech.linear", "increment", "plan", "record", "results", "workers"},
     "ensemble": {
         *{"design", "geometry", "folder", "lock", "plan", "plot.style", "report.frame", "report.table", "results"},
@@ -78,7 +87,7 @@ ALLOWED: dict[str, set[str]] = {
     },
     "study": {
         *{"design", "geometry.weave", "mech.configuration", "mech.linear", "mech.multifrontal"},
-        *{"discretisation", "error_estimate", "folder", "lock", "plan", "record", "results", "schedule", "workers"},
+        *{"branch_check", "error_estimate", "folder", "lock", "plan", "record", "results", "schedule", "workers"},
     },
 }
 ANYTHING = {"cli", "__main__"}  # the command line, which nobody imports

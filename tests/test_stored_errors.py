@@ -18,7 +18,7 @@ from circuittex.frozen import same
 from circuittex.report.errors import error_section
 from circuittex.report.page import page
 from circuittex.results import Study
-from circuittex.store import append_error, load_study, write_study_start
+from circuittex.store import append_finding, load_study, write_study_start
 from circuittex.summary import summary, table, write_summary
 
 NAMES = ("Fx warp N", "Fy weft N", "I straight A", "I parallel A", "I perpendicular A", "Ry ohm", "Rc ohm")
@@ -40,8 +40,8 @@ def test_estimates_come_back_bit_for_bit_in_the_order_of_their_states(tmp_path: 
     path = tmp_path / "results.h5"
     write_study_start(path, STUDY)
     assert load_study(path).errors == ()
-    append_error(path, LAST)
-    append_error(path, FIRST)
+    append_finding(path, LAST)
+    append_finding(path, FIRST)
     assert same(load_study(path), ESTIMATED)
     write_study_start(path, ESTIMATED)
     assert same(load_study(path), ESTIMATED)

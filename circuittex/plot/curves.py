@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,6 +12,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from circuittex.geometry.mesh import Floats
+from circuittex.outcome import Outcome
 from circuittex.paths import loading_paths, turns
 from circuittex.plot.error_bars import Bar, draw_error_bars, error_bar_key
 from circuittex.plot.style import COLOURS, GREY, LINES, MARKERS, new_figure, style
@@ -21,6 +23,10 @@ CLAMPS = ("warp clamps, +x ends", "weft clamps, +y ends")
 ESTIMATED = ("Fx warp", "Fy weft")
 """What error estimates call the force along the yarns at these clamps."""
 MOST_COLUMNS = 3
+_DIAMOND: dict[str, Any] = {"linestyle": "", "marker": "D", "markersize": 7, "markerfacecolor": "none"}
+"""The other branch of a bifurcation, larger than the markers of the curve that it may lie on."""
+
+Value = Callable[[Outcome], float]
 
 
 def force_figure(study: Study) -> Figure:
@@ -35,7 +41,7 @@ def force_figure(study: Study) -> Figure:
             for side, clamps in enumerate(CLAMPS):
                 axes = figure.add_subplot(rows, columns, (2 * block + side) * columns + column + 1)
                 for component, name in enumerate(("Fx", "Fy", "Fz")):
-                    _line(axes, records, _clamp_force(side, component), COLOURS[component], component, name)
+                    _line(axes, study, records, _clamp_force(side, component), COLOURS[component], component, name)
                 draw_error_bars(axes, _bars(study, [records], ESTIMATED[side]), COLOURS[side])
                 axes.set_title(f"{path}: {clamps}" if path else clamps)
                 axes.set_ylabel("force (N)")
@@ -53,7 +59,7 @@ def conductance_figure(study: Study) -> Figure:
         for number, probe in enumerate(probes):
             axes = figure.add_subplot(rows, columns, number + 1)
             for k, (path, records) in enumerate(paths.items()):
-                _line(axes, records, _current(number), COLOURS[number % len(COLOURS)], k, path)
+                _line(axes, study, records, _current(number), COLOURS[number % len(COLOURS)], k, path)
             draw_error_bars(axes, _bars(study, paths.values(), f"I {probe.name}"), COLOURS[number % len(COLOURS)])
             axes.set_title(f"probe {probe.name}")
             axes.set_ylabel(f"current at {probe.voltage:g} V (A)")
@@ -68,8 +74,8 @@ def network_figure(study: Study) -> Figure:
         figure = new_figure(8.0, 3.4)
         left, right = figure.subplots(1, 2)
         for k, (path, records) in enumerate(paths.items()):
-            _line(left, records, lambda r: r.fit.Ry, COLOURS[0], k, path)
-            _line(right, records, lambda r: r.fit.Rc, COLOURS[1], k, path)
+            _line(left, study, records, lambda outcome: outcome.Ry, COLOURS[0], k, path)
+            _line(right, study, records, lambda outcome: outcome.Rc, COLOURS[1], k, path)
         insulated = insulated_resistance(study.mesh)
         if np.isfinite(insulated):
             left.axhline(insulated, color=GREY, linestyle="--", linewidth=1.0, label=f"insulated, {insulated:.4g} Ω")
@@ -88,12 +94,12 @@ def network_figure(study: Study) -> Figure:
     return figure
 
 
-def _clamp_force(side: int, component: int) -> Callable[[Record], float]:
-    return lambda record: float(record.clamp_force[side, component])
+def _clamp_force(side: int, component: int) -> Value:
+    return lambda outcome: float(outcome.clamp_force[side, component])
 
 
-def _current(number: int) -> Callable[[Record], float]:
-    return lambda record: record.currents[number]
+def _current(number: int) -> Value:
+    return lambda outcome: outcome.currents[number]
 
 
 def _bars(study: Study, paths: Iterable[Sequence[Record]], name: str) -> Iterator[Bar]:
@@ -106,11 +112,12 @@ def _bars(study: Study, paths: Iterable[Sequence[Record]], name: str) -> Iterato
 
 
 def _line(
-    axes: Axes, records: Sequence[Record], value: Callable[[Record], float], colour: str, kind: int, label: str
+    axes: Axes, study: Study, records: Sequence[Record], value: Value, colour: str, kind: int, label: str
 ) -> None:
-    """One quantity along one path; `kind` chooses marker and dashes. States on the way back have hollow markers."""
+    """One quantity along one path; `kind` chooses marker and dashes. States on the way back have hollow markers, the
+    other branches of bifurcations diamonds."""
     strain = np.array([record.strain for record in records])
-    values = np.array([value(record) for record in records])
+    values = np.array([value(record.outcome) for record in records])
     marker = MARKERS[kind % len(MARKERS)]
     (line,) = axes.plot(strain, values, LINES[kind % len(LINES)], color=colour, label=label or "_", linewidth=1.3)
     back = _on_the_way_back(strain)
@@ -122,6 +129,10 @@ def _line(
     for middle in ((first + last) // 2 for first, last in branches):
         arrow = {"arrowstyle": "-|>", "color": colour, "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", (strain[middle + 1], values[middle + 1]), (strain[middle], values[middle]), arrowprops=arrow)
+
+    other = [(record.strain, value(check.again)) for record in records if (check := study.bifurcation_of(record.name))]
+    if other:
+        axes.plot(*zip(*other, strict=True), color=colour, **_DIAMOND)
 
 
 def _on_the_way_back(strain: Floats) -> NDArray[np.bool_]:
@@ -145,6 +156,8 @@ def _finish(figure: Figure, study: Study, names: Sequence[str]) -> None:
             Line2D([], [], marker="o", linestyle="", color=GREY, markerfacecolor=face, markersize=4.5, label=label)
             for face, label in ((GREY, "strain growing"), ("white", "on the way back"))
         ]
+    if any(study.bifurcation_of(record.name) for record in study.records):
+        keys.append(Line2D([], [], color=GREY, label="other branch of a bifurcation", **_DIAMOND))
     if any(np.isfinite(quantity.absolute) for error in study.errors for quantity in error.quantities):
         keys.append(error_bar_key())
     if keys:

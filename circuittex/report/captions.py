@@ -23,12 +23,12 @@ _CAPTIONS = {
     "convergence": "The potential on the mesh of the mechanics, and on two refinements of it, converges to the "
     "circuit: largest relative error of a probe current in the relaxed state.",
 }
-_ERROR_BARS = {
+_CURVES = {
     "forces": "of the force along the yarns",
     "probes": "of the currents",
     "network": "of Ry and Rc",
 }
-"""Figure -> what its error bars belong to."""
+"""Figure of curves against strain -> what its error bars belong to."""
 _FIGURES_OF_THE_PAPER = {
     "cell": "9 (right)",
     "section": "10",
@@ -47,11 +47,14 @@ def captions(study: Study) -> dict[str, str]:
     where = "at the largest strain of each loading path" if strained else "of the relaxed cell"
     texts = {name: text.format(where=where) for name, text in _CAPTIONS.items()}
     if study.errors:
-        for name, what in _ERROR_BARS.items():
+        for name, what in _CURVES.items():
             texts[name] += (
                 f" Bars: the estimated discretisation error {what}, in the relaxed state and the last one of each "
                 "loading path; one too long for the picture ends in an arrow head, with its size."
             )
+    if any(check.bifurcation for check in study.branches):
+        for name in _CURVES:
+            texts[name] += " Open diamonds: the other branch of a bifurcation."
     if parameter_set(study.design) is None:
         return texts
     paper = _FIGURES_OF_THE_PAPER

@@ -50,6 +50,7 @@ footer { margin-top: 3rem; color: #555; font-size: .85rem; }
 <h1>$title</h1>
 $facts
 $verdict
+$alarm
 <h2>The cell</h2>
 $figure_cell
 $figure_section
@@ -66,6 +67,7 @@ $figure_temperatures
 currents of each state.</p>
 $figure_network
 $network
+$branches
 $errors
 $claims
 <h2>Verification</h2>

@@ -13,6 +13,7 @@ import numpy as np
 from circuittex.atomic import write_text
 from circuittex.claims.table import Table, claims_table
 from circuittex.plot import save_figures
+from circuittex.report.branches import branch_alarm, branch_section
 from circuittex.report.captions import captions
 from circuittex.report.claims import claims_section
 from circuittex.report.energy import energy_section
@@ -49,9 +50,11 @@ def page(study: Study, pictures: Mapping[str, bytes], beside: Sequence[Study] = 
         title=escape(study.design.name),
         facts=_facts(study, claims),
         verdict=_verdict(study),
+        alarm=branch_alarm(study.branches),
         states=_states(study),
         network=_network(study),
         claims=claims_section(claims),
+        branches=branch_section(study.branches, [probe.name for probe in study.design.probes]),
         errors=error_section(study.errors),
         verification=_verification(study),
         parameters=parameters(study.design),

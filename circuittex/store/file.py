@@ -11,10 +11,11 @@ from typing import Any
 import h5py
 
 from circuittex.atomic import replacing
+from circuittex.bifurcation import BranchCheck
 from circuittex.design import Design
 from circuittex.discretisation import ErrorEstimate
 from circuittex.errors import CircuittexError, StoreError
-from circuittex.results import Record, Study
+from circuittex.results import FINDINGS, Finding, Record, Study, with_finding
 from circuittex.store.archive import Digests, Reader, Writer, registry
 
 FORMAT = "circuittex results"
@@ -22,6 +23,8 @@ VERSION = 1
 """Version of the file layout; files of another layout are refused."""
 HEAD = ("version", "design", "design_hash", "mesh", "initial")
 """The fields of a `Study` that are known before its first record."""
+NAMES: dict[type[Finding], str] = {ErrorEstimate: "error estimate", BranchCheck: "branch check"}
+"""What findings are called where one is damaged."""
 LIBVER = ("v110", "v110")
 """HDF5 1.10: its metadata carry checksums, and every viewer of the last years reads it."""
 
@@ -43,8 +46,9 @@ def write_study_start(path: str | Path, study: Study) -> None:
         file.create_group("records")
         for record in study.records:
             _add(file, "records", writer, record)
-        for estimate in study.errors:
-            _add(file, "errors", writer, estimate)
+        for group in FINDINGS.values():
+            for finding in getattr(study, group):
+                _add(file, group, writer, finding)
 
     _replace(Path(path), "w", fill)
 
@@ -61,12 +65,12 @@ def append_record(path: str | Path, record: Record) -> None:
     _append(path, "records", record)
 
 
-def append_error(path: str | Path, estimate: ErrorEstimate) -> None:
-    """Add the error estimate of a recorded state to the results file at `path`, in the manner of `append_record`.
+def append_finding(path: str | Path, finding: Finding) -> None:
+    """Add a finding about a recorded state to the results file at `path`, in the manner of `append_record`.
 
     Errors: `StoreError` as there.
     """
-    _append(path, "errors", estimate)
+    _append(path, FINDINGS[type(finding)], finding)
 
 
 def load_study(path: str | Path) -> Study:
@@ -83,9 +87,11 @@ def load_study(path: str | Path) -> Study:
             raise StoreError("its content does not match its digest")
         study = Study(**dict(zip(HEAD, head, strict=True)), records=())
         records = _in_order(study.design, _members(file["records"], "record", reader, digest))
-        errors = _members(file["errors"], "error estimate", reader, digest) if "errors" in file else ()
-        place = {record.name: number for number, record in enumerate(records)}
-        return replace(study, records=records, errors=tuple(sorted(errors, key=lambda error: place[error.state])))
+        study = replace(study, records=records)
+        for kind, group in FINDINGS.items():
+            for finding in _members(file[group], NAMES[kind], reader, digest) if group in file else ():
+                study = with_finding(study, finding)
+        return study
 
     path = Path(path)
     if not path.is_file():
@@ -100,7 +106,7 @@ def _in_order(design: Design, records: Sequence[Record]) -> tuple[Record, ...]:
     return tuple(sorted(records, key=lambda record: rank[record.path]))
 
 
-def _append(path: str | Path, group: str, value: Record | ErrorEstimate) -> None:
+def _append(path: str | Path, group: str, value: Record | Finding) -> None:
     def fill(file: h5py.File) -> None:
         _check_layout(file)
         _add(file, group, Writer(file), value)
@@ -108,7 +114,7 @@ def _append(path: str | Path, group: str, value: Record | ErrorEstimate) -> None
     _replace(Path(path), "r+", fill)
 
 
-def _add(file: h5py.File, group: str, writer: Writer, value: Record | ErrorEstimate) -> None:
+def _add(file: h5py.File, group: str, writer: Writer, value: Record | Finding) -> None:
     members = file.require_group(group)
     name = _name(len(members))
     writer.put(members, name, value)

@@ -1,4 +1,4 @@
-"""Two ways to one state, compared: does round-off choose among branches? Arithmetic alone.
+"""Two ways to one state, compared: are they on one branch? Arithmetic alone.
 
 `docs/numerics.md` says what the check of branches does and what it does not.
 """
@@ -15,13 +15,12 @@ from circuittex.outcome import Outcome
 
 ALLOWED = 1e-6
 """Relative difference, of clamp forces to the largest component and of each current to itself, up to which two ways to
-a state have the same end: what circuittex promises of the solver and of the order of the fibrils. On one branch of the
-paper's cell, relaxed to the default tolerance, 4e-8 in forces and 7e-7 in currents were seen; branches that were found
-lie 1e-4 to 1e-1 apart."""
+a state have the same end: what circuittex promises of the solver and of the order of the fibrils. In the paper's cell,
+at the default tolerance, one branch gave 4e-8 in forces and 7e-7 in currents; others lie half a per cent off."""
 SETTLED = 0.1
 """Part of `ALLOWED` that the largest free force may be of the largest clamp force, lest a difference be put down to a
-branch which an unfinished relaxation has left. Forces and currents follow the residual at about its own rate: in the
-paper's cell a residual of 7e-7 of the force left currents 7e-7 apart."""
+branch which an unfinished relaxation has left. What a residual leaves in forces and currents is of about its own size:
+with the default tolerance, 7e-7 of the paper's clamp forces, currents were within 7e-7. A tenth is on the safe side."""
 
 
 class Verdict(StrEnum):
@@ -72,7 +71,7 @@ class BranchCheck:
 
     @property
     def bifurcation(self) -> bool:
-        """Whether round-off chose between two branches."""
+        """Whether the two ways end on two branches."""
         return self.verdict is Verdict.BIFURCATION
 
     @property
@@ -112,8 +111,9 @@ def branch_statement(checks: Sequence[BranchCheck]) -> tuple[str, ...]:
     sentences = []
     if found := by_verdict[Verdict.BIFURCATION]:
         sentences.append(
-            f"BIFURCATION in {_names(found)}: round-off decides which of two branches is reached, with clamp forces or "
-            f"currents up to {max(check.difference for check in found):.1e} apart; the report shows both."
+            f"BIFURCATION in {_names(found)}: the order of the fibrils, which means nothing, decides which of two "
+            f"branches is reached, with clamp forces or currents up to {max(c.difference for c in found):.1e} apart; "
+            "the report shows both."
         )
     if missing := by_verdict[Verdict.MISSING]:
         sentences.append(f"With the fibrils in another order NO equilibrium was found in {_names(missing)}.")

@@ -1,7 +1,8 @@
 """Does round-off choose the branch of a state? The state once more, from the same start, its fibrils in another order.
 
-Only the order of unknowns, contacts and sums differs, hence the round-off. That suffices to show a state whose branch
-hangs on it; it is no search for other equilibria.
+Only the order of unknowns, contacts and sums differs: the round-off, and with it the start from which a way out of a
+saddle point is looked for. That suffices to show a state whose branch hangs on such things; it is no search for other
+equilibria.
 """
 
 from __future__ import annotations

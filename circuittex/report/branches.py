@@ -18,13 +18,15 @@ from circuittex.outcome import Outcome
 from circuittex.report.table import number, table
 
 _INTRODUCTION = (
-    "Each state was reached once more from the recorded state before it with the fibrils in another order, which "
-    "changes nothing but round-off. Differences of clamp forces are relative to the largest component, those of "
-    f"currents each to itself; up to {ALLOWED:.0e} the branch is the same. Where they are larger and the tolerance of "
-    "the relaxation could be the reason, both were relaxed further and compared again. Where values agree although "
-    "nodes lie elsewhere, the two are images of one another. This is no search for other equilibria: a state that "
-    "keeps its branch may have others to which round-off does not lead."
+    "Each state was reached once more from the recorded state before it, with the fibrils in another order. That "
+    "changes round-off and, where a descent meets a saddle point, the start from which its way out is looked for; "
+    "neither means anything. Differences of clamp forces are relative to the largest component, those of currents each "
+    f"to itself; up to {ALLOWED:.0e} the branch is the same. Where they are larger and the tolerance of the relaxation "
+    "could be the reason, both were relaxed further and compared again. Where values agree although nodes lie "
+    "elsewhere, the two are images of one another. This is no search for other equilibria: a state that keeps its "
+    "branch may have more."
 )
+_WHICH = ("recorded", "other")
 
 
 def branch_alarm(checks: Sequence[BranchCheck]) -> str:
@@ -75,14 +77,16 @@ def _both(check: BranchCheck, probes: Sequence[str]) -> str:
     """The two branches of a bifurcation side by side."""
     names = [f"{side} F{axis} (N)" for side in ("warp +x", "weft +y") for axis in "xyz"]
     names += [*(f"I {probe} (A)" for probe in probes), "Ry (Ω)", "Rc (Ω)", "stored energy (N mm)"]
-    pairs = zip(names, _values(check.recorded), _values(check.again), strict=True)
-    rows = [[name, number(one, 7), number(other, 7), number(other - one, 2)] for name, one, other in pairs]
-    both = table(["", "recorded branch", "other branch", "difference"], rows)
-    return (
-        f'<div class="bad"><h3>Bifurcation in {escape(check.state)}</h3><p>Round-off decides which of these two '
-        f"equilibria is reached; they are up to {number(check.moved, 2)} mm apart. Neither is more right than the "
-        f"other, and what follows on the loading path rests on the recorded one.</p>{both}</div>"
+    head = ["", "recorded branch", "other branch", *(f"{which}, relaxed further" for which in _WHICH if check.settled)]
+    outcomes = check.recorded, check.again, *check.settled
+    columns = ([number(value, 7) for value in _values(outcome)] for outcome in outcomes)
+    both = table(head, list(zip(names, *columns, strict=True)))
+    words = (
+        "The order of the fibrils decides which of these two equilibria is reached; their nodes are up to "
+        f"{number(check.moved, 2)} mm apart. Neither is more right than the other, and what follows on the loading path "
+        "rests on the recorded one."
     )
+    return f'<div class="bad"><h3>Bifurcation in {escape(check.state)}</h3><p>{words}</p>{both}</div>'
 
 
 def _values(outcome: Outcome) -> list[float]:

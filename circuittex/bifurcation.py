@@ -111,7 +111,7 @@ def branch_statement(checks: Sequence[BranchCheck]) -> tuple[str, ...]:
     sentences = []
     if found := by_verdict[Verdict.BIFURCATION]:
         sentences.append(
-            f"BIFURCATION in {_names(found)}: the order of the fibrils, which means nothing, decides which of two "
+            f"BIFURCATION in {_names(found)}: the order of the fibrils, which should not matter, decides which of two "
             f"branches is reached, with clamp forces or currents up to {max(c.difference for c in found):.1e} apart; "
             "the report shows both."
         )

@@ -126,6 +126,11 @@ def section(study: Study) -> str:
 
 def test_the_report_has_a_row_for_each_check() -> None:
     text = section(CHECKED)
+    head = re.findall(r'<th scope="col">(.*?)</th>', text)[:7]
+    assert head == [
+        *("state", "clamp forces (relative)", "currents (relative)", "relaxed further (relative)", "energy (N mm)"),
+        *("largest distance (mm)", "verdict"),
+    ]
     for check, cells in (
         (KEPT, ("4e-08", "4e-08", "–", "1.6e-08", "1e-07", "same branch")),
         (NONE, ("–", "–", "–", "–", "–", "no equilibrium")),
@@ -148,7 +153,7 @@ def test_both_branches_of_a_bifurcation_stand_side_by_side() -> None:
         ("Rc (Ω)", (own.Rc, other.Rc)),
         ("stored energy (N mm)", (own.energy, other.energy)),
     ):
-        cells = "".join(f"<td>{float(f'{value:.7g}'):g}</td>" for value in values)
+        cells = "".join(f"<td>{value:.8g}</td>" for value in values)
         assert f'<th scope="row">{name}</th>{cells}</tr>' in box
 
 
@@ -156,7 +161,7 @@ def test_branches_that_part_when_relaxed_further_show_that_too() -> None:
     parted = replace(OTHER, settled=(scaled(FORK, 2.0), scaled(FORK, 3.0)))
     text = section(replace(STUDY, branches=(parted,)))
     assert '<th scope="col">other, relaxed further</th>' in text
-    cells = "".join(f"<td>{float(f'{factor * FORK.energy:.7g}'):g}</td>" for factor in (1.0, 1.25, 2.0, 3.0))
+    cells = "".join(f"<td>{factor * FORK.energy:.8g}</td>" for factor in (1.0, 1.25, 2.0, 3.0))
     assert f'<th scope="row">stored energy (N mm)</th>{cells}</tr>' in text
 
 

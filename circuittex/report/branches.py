@@ -26,6 +26,8 @@ _INTRODUCTION = (
     "elsewhere, the two are images of one another. This is no search for other equilibria: a state that keeps its "
     "branch may have more."
 )
+DIGITS = 8
+"""Of both branches: one more than differences of `ALLOWED` need to be seen."""
 _WHICH = ("recorded", "other")
 
 
@@ -47,14 +49,8 @@ def branch_section(checks: Sequence[BranchCheck], probes: Sequence[str]) -> str:
     """
     if not checks:
         return ""
-    head = [
-        "state",
-        "clamp forces (relative)",
-        "currents (relative)",
-        "energy (N mm)",
-        "largest distance (mm)",
-        "verdict",
-    ]
+    head = ["state", "clamp forces (relative)", "currents (relative)", "relaxed further (relative)"]
+    head += ["energy (N mm)", "largest distance (mm)", "verdict"]
     rows = table(head, [_row(check) for check in checks])
     boxes = "".join(_both(check, probes) for check in checks if check.bifurcation)
     reasons = "".join(
@@ -79,12 +75,12 @@ def _both(check: BranchCheck, probes: Sequence[str]) -> str:
     names += [*(f"I {probe} (A)" for probe in probes), "Ry (Ω)", "Rc (Ω)", "stored energy (N mm)"]
     head = ["", "recorded branch", "other branch", *(f"{which}, relaxed further" for which in _WHICH if check.settled)]
     outcomes = check.recorded, check.again, *check.settled
-    columns = ([number(value, 7) for value in _values(outcome)] for outcome in outcomes)
+    columns = ([number(value, DIGITS) for value in _values(outcome)] for outcome in outcomes)
     both = table(head, list(zip(names, *columns, strict=True)))
     words = (
         "The order of the fibrils decides which of these two equilibria is reached; their nodes are up to "
-        f"{number(check.moved, 2)} mm apart. Neither is more right than the other, and what follows on the loading path "
-        "rests on the recorded one."
+        f"{number(check.moved, 2)} mm apart. Neither is more right than the other, and what follows on the loading "
+        "path rests on the recorded one."
     )
     return f'<div class="bad"><h3>Bifurcation in {escape(check.state)}</h3><p>{words}</p>{both}</div>'
 

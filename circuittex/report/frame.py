@@ -25,7 +25,7 @@ th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #ddd
 thead th { border-bottom: 2px solid #888; vertical-align: bottom; }
 th:first-child { text-align: left; }
 tbody th { font-weight: 500; white-space: nowrap; }
-.good, .bad { padding: .2rem 1rem; border-left: .4rem solid #009e73; background: #eef8f4; }
+.good, .bad { margin: .8rem 0; padding: .2rem 1rem; border-left: .4rem solid #009e73; background: #eef8f4; }
 .bad { border-color: #d55e00; background: #fdf1e8; font-weight: 600; }
 .numbers td { white-space: nowrap; }
 .numbers th, .numbers td { padding: .25rem .5rem; }

@@ -19,7 +19,8 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def number(value: float, digits: int = 4) -> str:
     """A number to read, with a dash for what is undefined.
 
-    >>> number(0.28294, 3), number(1234.5, 2), number(float("nan"))
-    ('0.283', '1200', '–')
+    >>> number(0.28294, 3), number(1234.5, 2), number(float("nan")), number(0.123456789, 8)
+    ('0.283', '1200', '–', '0.12345679')
     """
-    return f"{float(f'{value:.{digits}g}'):g}" if value == value else "–"
+    # Rounded first: only then is 1200 not 1.2e+03.
+    return f"{float(f'{value:.{digits}g}'):.{max(digits, 6)}g}" if value == value else "–"

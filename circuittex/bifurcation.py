@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import StrEnum
+from math import nan
 
 import numpy as np
 
@@ -59,13 +60,18 @@ class BranchCheck:
         return difference(self.recorded, self.again)
 
     @property
+    def settled_difference(self) -> float:
+        """The same of both relaxed further; nan where they were not."""
+        return difference(*self.settled) if self.settled else nan
+
+    @property
     def verdict(self) -> Verdict:
         """What the two say of the state."""
         if np.isnan(self.difference):
             return Verdict.MISSING
         if self.difference <= ALLOWED:
             return Verdict.SAME
-        if self.settled and difference(*self.settled) <= ALLOWED:
+        if self.settled_difference <= ALLOWED:
             return Verdict.TOLERANCE
         return Verdict.UNDECIDED if self.trouble else Verdict.BIFURCATION
 
@@ -110,10 +116,10 @@ def branch_statement(checks: Sequence[BranchCheck]) -> tuple[str, ...]:
     by_verdict = {verdict: [check for check in checks if check.verdict == verdict] for verdict in Verdict}
     sentences = []
     if found := by_verdict[Verdict.BIFURCATION]:
+        apart = max(np.fmax(check.difference, check.settled_difference) for check in found)
         sentences.append(
             f"BIFURCATION in {_names(found)}: the order of the fibrils, which should not matter, decides which of two "
-            f"branches is reached, with clamp forces or currents up to {max(c.difference for c in found):.1e} apart; "
-            "the report shows both."
+            f"branches is reached, with clamp forces or currents up to {apart:.1e} apart; the report shows both."
         )
     if missing := by_verdict[Verdict.MISSING]:
         sentences.append(f"With the fibrils in another order NO equilibrium was found in {_names(missing)}.")

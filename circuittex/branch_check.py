@@ -27,7 +27,7 @@ from circuittex.relaxation import relax
 from circuittex.results import Record, Study
 from circuittex.workers import Job
 
-SEED = 0
+SEED = 1
 """Of the other order; any will do, and a fixed one makes the check repeatable."""
 
 Solver = Callable[[], LinearSolver]
@@ -38,7 +38,7 @@ def another_order(n: int) -> Ints:
     """(n,) the numbers below n in an order that is always the same one and, from two on, not their own.
 
     >>> another_order(5).tolist(), another_order(2).tolist()
-    ([2, 4, 3, 0, 1], [1, 0])
+    ([4, 0, 1, 2, 3], [1, 0])
     """
     order = np.random.default_rng(SEED).permutation(n)
     return order if np.any(order != np.arange(n)) else order[::-1]

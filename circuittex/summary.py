@@ -74,7 +74,6 @@ import numpy as np
 
 from circuittex.atomic import write_text
 from circuittex.bifurcation import BranchCheck, branch_statement, current_difference, force_difference
-from circuittex.bifurcation import difference as difference_between
 from circuittex.discretisation import ErrorEstimate
 from circuittex.geometry.mesh import FibrilMesh, Floats
 from circuittex.results import Record, Study
@@ -310,7 +309,7 @@ def _branch_check(check: BranchCheck) -> dict[str, Any]:
         "current_difference": current_difference(check.recorded, again),
         "energy_difference_N_mm": again.energy - check.recorded.energy,
         "moved_mm": check.moved,
-        "settled_difference": difference_between(*check.settled) if check.settled else None,
+        "settled_difference": check.settled_difference,
         "trouble": check.trouble,
         "clamp_force_N": _by_axis(again.clamp_force),
         "currents_A": again.currents,

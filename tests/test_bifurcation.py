@@ -88,8 +88,8 @@ def test_every_finding_has_its_sentence_and_the_worst_comes_first() -> None:
         check(off(force=1e-3), state="loose", settled=(OUTCOME, OUTCOME)),
         check(off(force=1e-3), state="open", trouble="stuck"),
         check(NOTHING, state="lost", trouble="stuck"),
-        check(off(force=2e-2), state="fork"),
-        check(off(force=1e-2), state="other fork"),
+        check(off(force=1e-5), state="fork", settled=(OUTCOME, off(force=2e-2))),
+        check(off(force=1e-2), state="other fork", settled=(OUTCOME, off(force=1e-4))),
     ]
     fork, lost, undecided, loose, good = branch_statement(checks)
     assert "BIFURCATION in fork, other fork: " in fork

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
-from math import nan
 
 from circuittex.bifurcation import (
     ALLOWED,
     BranchCheck,
     branch_statement,
     current_difference,
-    difference,
     force_difference,
 )
 from circuittex.outcome import Outcome
@@ -63,9 +61,8 @@ def branch_section(checks: Sequence[BranchCheck], probes: Sequence[str]) -> str:
 
 def _row(check: BranchCheck) -> list[str]:
     recorded, again = check.recorded, check.again
-    settled = difference(*check.settled) if check.settled else nan
-    differences = force_difference(recorded, again), current_difference(recorded, again), settled
-    values = *differences, again.energy - recorded.energy, check.moved
+    differences = force_difference(recorded, again), current_difference(recorded, again)
+    values = *differences, check.settled_difference, again.energy - recorded.energy, check.moved
     return [check.state, *(number(value, 2) for value in values), check.verdict]
 
 

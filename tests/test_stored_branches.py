@@ -50,6 +50,8 @@ def test_checks_come_back_bit_for_bit_in_the_order_of_their_states(tmp_path: Pat
     write_study_start(path, STUDY)
     for check in (LOOSE, NONE, KEPT, OTHER):
         append_finding(path, check)
+    with h5py.File(path, "r") as file:
+        assert set(file["branches"]) == {"0000", "0001", "0002", "0003"}
     assert same(load_study(path), CHECKED)
     write_study_start(path, CHECKED)
     assert same(load_study(path), CHECKED)

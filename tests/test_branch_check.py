@@ -18,6 +18,7 @@ from circuittex.bifurcation import ALLOWED, BranchCheck, Verdict
 from circuittex.branch_check import another_order, check_branch
 from circuittex.cli import main
 from circuittex.design import Design, Loading, starter, uniaxial
+from circuittex.discretisation import ErrorEstimate
 from circuittex.errors import CircuitError, ConvergenceError
 from circuittex.frozen import same
 from circuittex.geometry.mesh import FibrilMesh
@@ -205,6 +206,17 @@ def test_an_interrupted_check_goes_on_with_those_that_are_missing(canned: Study,
     assert checks_said(said) == STATES[2:]
     assert [check.state for check in study.branches] == STATES
     assert (tmp_path / "report.html").exists()
+
+
+def test_checks_and_error_estimates_in_one_run(canned: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def estimate(design: Design, mesh: FibrilMesh, record: Record, solver: object, say: Say) -> ErrorEstimate:
+        return ErrorEstimate(record.name, (10, 20, 40), (4, 8), np.zeros(3), (), ())
+
+    monkeypatch.setattr("circuittex.error_estimate.estimate_error", estimate)
+    study = run_study(canned.design, tmp_path, branches=True, error_estimate=True, workers=1)
+    assert [check.state for check in study.branches] == STATES
+    assert [found.state for found in study.errors] == ["relaxed", "stretch-0.05", "shear-0.05"]
+    assert same(load_study(tmp_path / "results.h5"), study)
 
 
 def test_what_is_no_matter_of_convergence_ends_the_run(canned: Study, monkeypatch: pytest.MonkeyPatch) -> None:

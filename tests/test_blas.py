@@ -7,9 +7,10 @@ import time
 
 import numpy as np
 import pytest
+from scipy.linalg import cython_blas
 
 from circuittex.geometry.mesh import Floats
-from circuittex.mech.blas import cholesky, solve_border, subtract_products
+from circuittex.mech.blas import _routine, cholesky, solve_border, subtract_products
 
 ROUND_OFF = 1e-12
 """Relative: a few hundred operations for each value, and condition numbers of some hundred."""
@@ -43,6 +44,12 @@ def test_a_pivot_that_is_not_positive(value: float, at: int) -> None:
     K = np.diag(np.arange(1.0, 11.0))
     K[at, at] = value
     assert not cholesky(K)
+
+
+def test_a_routine_with_other_arguments_is_not_called() -> None:
+    """SciPy may come with integers of another size: that must not end in wrong numbers."""
+    with pytest.raises(ImportError, match="dsyrk of this version of SciPy"):
+        _routine(cython_blas, "dsyrk", "cciiddidd")
 
 
 def test_other_threads_run_meanwhile() -> None:

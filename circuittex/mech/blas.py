@@ -8,6 +8,7 @@ Fortran, which goes by columns, they are transposed, with their values in the lo
 from __future__ import annotations
 
 import ctypes
+import re
 from collections.abc import Callable
 from ctypes import byref, c_char, c_double, c_int, c_void_p
 from types import ModuleType
@@ -18,21 +19,27 @@ from scipy.linalg import cython_blas, cython_lapack
 from circuittex.geometry.mesh import Floats
 
 
-def _routine(module: ModuleType, name: str, arguments: int) -> Callable[..., None]:
-    """The Fortran routine of that name, which takes so many addresses. While it runs, Python's lock is free."""
+def _routine(module: ModuleType, name: str, arguments: str) -> Callable[..., None]:
+    """The Fortran routine of that name; `arguments` are its types: letter c, integer i or double d.
+
+    Raises `ImportError` where SciPy has it with others, integers of another size for example.
+    """
+    found = LowLevelCallable.from_cython(module, name)
+    types = {"c": "char", "i": "int", "d": r"(double|\w+_d)"}
+    known = ", ".join(rf"{types[kind]} \*" for kind in arguments)
+    if not re.fullmatch(rf"void \({known}\)", found.signature):
+        raise ImportError(f"{name} of this version of SciPy takes other arguments than are known: {found.signature}")
     api, capsule = ctypes.pythonapi, ctypes.py_object
     name_of = ctypes.PYFUNCTYPE(ctypes.c_char_p, capsule)(("PyCapsule_GetName", api))
     address_of = ctypes.PYFUNCTYPE(c_void_p, capsule, ctypes.c_char_p)(("PyCapsule_GetPointer", api))
-    function = LowLevelCallable.from_cython(module, name).function
-    routine: Callable[..., None] = ctypes.CFUNCTYPE(None, *[c_void_p] * arguments)(
-        address_of(function, name_of(function))
-    )
+    address = address_of(found.function, name_of(found.function))
+    routine: Callable[..., None] = ctypes.CFUNCTYPE(None, *[c_void_p] * len(arguments))(address)
     return routine
 
 
-_dpotrf = _routine(cython_lapack, "dpotrf", 5)
-_dtrsm = _routine(cython_blas, "dtrsm", 11)
-_dsyrk = _routine(cython_blas, "dsyrk", 10)
+_dpotrf = _routine(cython_lapack, "dpotrf", "cidii")
+_dtrsm = _routine(cython_blas, "dtrsm", "cccciiddidi")
+_dsyrk = _routine(cython_blas, "dsyrk", "cciiddiddi")
 _LOWER, _RIGHT, _TRANSPOSED, _PLAIN = (byref(c_char(letter)) for letter in (b"L", b"R", b"T", b"N"))
 _ONE, _MINUS = byref(c_double(1.0)), byref(c_double(-1.0))
 

@@ -102,7 +102,7 @@ def _add_run(commands: Commands) -> None:
         "--branches",
         action="store_true",
         help="reach every recorded state once more, with the fibrils in another order, and say whether clamp forces "
-        "and currents stay the same or round-off chooses among branches; this takes as long as the relaxations did. A "
+        "and currents stay the same or that order chooses among branches; this takes as long as the relaxations did. A "
         "run made without gets the checks when it is repeated with this option",
     )
     parser.add_argument(

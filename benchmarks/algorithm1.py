@@ -111,7 +111,7 @@ class Tables:
         changed = [term.prepare(q) for term in self.terms]
         if self.pattern is None or any(changed):
             full, point = (np.concatenate(pairs) for pairs in zip(*(term.pairs() for term in self.terms), strict=True))
-            pattern = self.pattern = build_pattern(len(q) // 9, full, point)
+            pattern = self.pattern = build_pattern(len(q) // 9, full, point, q.reshape(-1, 9)[:, :3].copy())
             rows = np.repeat(np.arange(len(q)), np.diff(pattern.indptr))
             self.held = np.flatnonzero(np.isin(rows, self.fixed) | np.isin(pattern.indices, self.fixed))
         return self.pattern

@@ -124,7 +124,8 @@ class Study:
 
     def bifurcation_of(self, state: str) -> BranchCheck | None:
         """The check of a state's branch, if it found another one."""
-        return next((check for check in self.branches if check.state == state and check.bifurcation), None)
+        check = self.check_of(state)
+        return check if check is not None and check.bifurcation else None
 
 
 Finding = ErrorEstimate | BranchCheck

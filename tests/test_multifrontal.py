@@ -183,16 +183,17 @@ def test_threads_change_no_bit(threads: int, monkeypatch: pytest.MonkeyPatch) ->
     assert len(set(found)) == 1
 
 
-def test_an_error_in_a_thread_comes_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_memory(*_: object) -> None:
-        raise MemoryError
+@pytest.mark.parametrize("error", [MemoryError, IndexError])
+def test_an_error_in_a_thread_comes_out(error: type[Exception], monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise error
 
     solver, pattern = MultifrontalSolver(), grid(8)
     monkeypatch.setattr(elimination_tree, "SHARE", 1e-3)
     monkeypatch.setattr(elimination_tree, "FRONT", 0.0)
     monkeypatch.setattr(multifrontal, "cores", lambda: 2)
-    monkeypatch.setattr(multifrontal, "_add", no_memory)
-    with pytest.raises(MemoryError):
+    monkeypatch.setattr(multifrontal, "_add", fail)
+    with pytest.raises(error):
         solver.factor(pattern, random_values(pattern, 8, 0.1))
 
 

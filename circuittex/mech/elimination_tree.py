@@ -88,6 +88,16 @@ def _eliminate(indptr: Any, indices: Any, begin: Any) -> Any:
 
 
 @compiled
+def _append(head: Any, tail: Any, sibling: Any, k: int, first: int, last: int) -> None:
+    """Append the parts from first to last, a linked list, to that of part k."""
+    if head[k] < 0:
+        head[k] = first
+    else:
+        sibling[tail[k]] = first
+    tail[k] = last
+
+
+@compiled
 def _take_in(above: Any, p: Any, b: Any, front: float, addition: float) -> Any:
     """Which part takes each part in, itself where none does, and all those in an order of elimination.
 
@@ -115,18 +125,9 @@ def _take_in(above: Any, p: Any, b: Any, front: float, addition: float) -> Any:
                 taken[c], first, last = k, head[c], tail[c]
                 p[k] += p[c]
             if first >= 0:
-                if head[k] < 0:
-                    head[k] = first
-                else:
-                    sibling[tail[k]] = first
-                tail[k] = last
-        up = above[k]
-        if up >= 0:
-            if head[up] < 0:
-                head[up] = k
-            else:
-                sibling[tail[up]] = k
-            tail[up] = k
+                _append(head, tail, sibling, k, first, last)
+        if above[k] >= 0:
+            _append(head, tail, sibling, above[k], k, k)
     order, end, waiting = np.empty(n, np.int64), n, 0
     for k in range(n):
         if above[k] < 0:

@@ -72,8 +72,6 @@ class Analysis:
     """floating-point operations that a factorisation took when the parts were dissected."""
     subtrees: tuple[range, ...]
     """fronts to eliminate one after another, side by side with those of other ranges; the last is above all others."""
-    waiting: tuple[int, ...]
-    """of each front above these: how many are right below it."""
 
 
 def analyse(pattern: Pattern, coupled: NDArray[np.bool_], entries: Ints, last: Analysis | None = None) -> Analysis:
@@ -142,7 +140,6 @@ def analyse(pattern: Pattern, coupled: NDArray[np.bool_], entries: Ints, last: A
         parts=tree.parts,
         least=least,
         subtrees=subtrees(above, work(p.astype(float), b.astype(float))),
-        waiting=tuple(map(len, below)),
     )
 
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from threading import Lock
 from typing import Any
 
@@ -76,15 +75,18 @@ class MultifrontalSolver:
         Each thread takes subtrees of fronts. Who is the last to finish below a front goes on with that front.
         """
         assert self._analysis is not None, "factor comes first"
-        subtrees, waiting = deque(self._analysis.subtrees), list(self._analysis.waiting)
+        subtrees, waiting = deque(self._analysis.subtrees), [len(front.below) for front, _, _ in self._blocks]
         updates: dict[int, Floats] = {}
         lock = Lock()
         refused: list[int] = []
 
         def work() -> None:
-            while subtrees and not refused:
-                with suppress(IndexError):  # another thread has taken the last one
-                    climb(subtrees.popleft())
+            while not refused:
+                try:
+                    subtree = subtrees.popleft()
+                except IndexError:
+                    return
+                climb(subtree)
 
         def climb(subtree: range) -> None:
             k = subtree.start

@@ -24,7 +24,7 @@ from dataclasses import replace
 from circuittex.contact.extract import contact_state
 from circuittex.design import plain_weave
 from circuittex.geometry.weave import build_mesh
-from circuittex.relaxation import relax
+from circuittex.relaxation.relax import relax
 
 design = plain_weave(yarns=1)
 design = replace(design, numerics=replace(design.numerics, elements=4, tolerance=1e-3))

@@ -16,18 +16,19 @@ from pathlib import Path
 import numpy as np
 from measure import Table, arguments, publish
 
-from circuittex.bifurcation import current_difference, force_difference
-from circuittex.branch_check import SEED, another_order
-from circuittex.geometry.mesh import FibrilMesh, Ints
+from circuittex.base.arrays import Ints
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.order import reordered
 from circuittex.mech.configuration import Configuration
-from circuittex.mech.linear import LinearSolver
-from circuittex.mech.multifrontal import MultifrontalSolver
-from circuittex.mech.pardiso import PardisoSolver
-from circuittex.plan import plan
-from circuittex.record import outcome_of, reach
-from circuittex.results import Study
-from circuittex.store import load_study
+from circuittex.results.bifurcation import current_difference, force_difference
+from circuittex.results.records import Study
+from circuittex.results.store import load_study
+from circuittex.solvers.linear import LinearSolver
+from circuittex.solvers.multifrontal import MultifrontalSolver
+from circuittex.solvers.pardiso import PardisoSolver
+from circuittex.study.branch_check import SEED, another_order
+from circuittex.study.plan import plan
+from circuittex.study.record import outcome_of, reach
 
 SOLVERS: dict[str, Callable[[], LinearSolver]] = {solver.name: solver for solver in (MultifrontalSolver, PardisoSolver)}
 HEAD = ["state", "iterations", "recorded", "clamp force", "probe current"]

@@ -22,16 +22,16 @@ from pathlib import Path
 import numpy as np
 from measure import machine, markdown
 
+from circuittex.base.frozen import same
 from circuittex.design import Design, equal_steps, load_design, plain_weave, shear, uniaxial
-from circuittex.frozen import same
-from circuittex.results import Study
-from circuittex.store import load_study, write_study_start
-from circuittex.study import run_study
+from circuittex.results.records import Study
+from circuittex.results.store import load_study, write_study_start
+from circuittex.study.run import run_study
 
 RUN = """
 import sys
-from circuittex.store import load_study
-from circuittex.study import run_study
+from circuittex.results.store import load_study
+from circuittex.study.run import run_study
 run_study(load_study(sys.argv[1]).design, sys.argv[2], workers=int(sys.argv[3]) or None)
 """
 OUTPUTS = ("netlists/*", "vtu/*", "summary.json", "report.html", "figures/*")

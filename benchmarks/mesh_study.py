@@ -15,10 +15,10 @@ from measure import Table, arguments, publish
 
 from circuittex.contact.extract import contacts_of
 from circuittex.design import Design, plain_weave
-from circuittex.fields import solve_probes
+from circuittex.electrical.fields import solve_probes
 from circuittex.fit import fit_network
 from circuittex.geometry.weave import build_mesh
-from circuittex.relaxation import Equilibrium, clamp_force, move, relax
+from circuittex.relaxation.relax import Equilibrium, clamp_force, move, relax
 
 STRETCH = 1.025
 HEAD = [

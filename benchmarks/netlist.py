@@ -15,9 +15,9 @@ import numpy as np
 from measure import Table, arguments, paired, publish, ratio
 from woven import woven_circuit
 
-from circuittex.circuit import Circuit
+from circuittex.electrical.network.circuit import Circuit
+from circuittex.electrical.spice.pyspice import LARGEST
 from circuittex.netlist import deck, parse, subcircuit, to_pyspice
-from circuittex.pyspice_export import LARGEST
 
 HEAD = ["resistors", "subcircuit", "deck", "parse", "PySpice", "ready words", "deck / words", "PySpice / deck"]
 CELLS = (3, 0.5), (4, 0.1), (4, 0.0)

@@ -12,10 +12,10 @@ import numpy as np
 from measure import Table, arguments, fail, paired, publish, ratio
 from woven import woven_circuit
 
-from circuittex.circuit import Circuit
+from circuittex.electrical.network.circuit import Circuit
+from circuittex.electrical.network.nodal import solve_nodal
+from circuittex.electrical.spice.ngspice import find_ngspice, run_deck
 from circuittex.netlist import deck, pin_names
-from circuittex.ngspice import find_ngspice, run_deck
-from circuittex.nodal import solve_nodal
 
 HEAD = ["resistors", "nodes", "nodal ms", "ngspice ms", "ngspice / nodal", "relative difference"]
 CELLS = (2, 1.0), (3, 1.0), (4, 1.0), (4, 0.25)

@@ -13,10 +13,10 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from circuittex.claims.claim import AGREES
-from circuittex.claims.table import Table, claims_table
-from circuittex.results import Record, Study
-from circuittex.store import load_study
+from circuittex.results.claims.claim import AGREES
+from circuittex.results.claims.table import Table, claims_table
+from circuittex.results.records import Record, Study
+from circuittex.results.store import load_study
 
 PAGE = Path(__file__).parents[1] / "docs" / "paper.md"
 FORCES = ["warp Fx", "Fy", "Fz", "weft Fx", "Fy", "Fz"]

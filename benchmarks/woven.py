@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from circuittex.circuit import Circuit
 from circuittex.contact.extract import contact_state
 from circuittex.contact.merge import simplify
 from circuittex.design import plain_weave
-from circuittex.export import detailed_circuit
+from circuittex.electrical.network.circuit import Circuit
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
+from circuittex.study.export import detailed_circuit
 
 
 def woven_circuit(yarns: int, merge_length: float) -> Circuit:

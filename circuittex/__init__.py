@@ -6,7 +6,7 @@ The public names below are loaded when they are first used, so that ``import cir
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from circuittex.base.version import __version__
 
 _HOMES = {
     "design": ("Design", "design_hash", "load_design", "parse_design", "plain_weave", "starter"),
@@ -15,26 +15,25 @@ _HOMES = {
     "contact.state": ("ContactState",),
     "contact.extract": ("contact_state", "contacts_of"),
     "contact.merge": ("simplify",),
-    "fields": ("solve_fields",),
-    "circuit": ("Circuit", "build_circuit", "reduced_circuit", "yarn_end_terminals"),
-    "nodal": ("solve_nodal",),
+    "electrical.fields": ("solve_fields",),
+    "electrical.network.circuit": ("Circuit", "build_circuit", "reduced_circuit", "yarn_end_terminals"),
+    "electrical.network.nodal": ("solve_nodal",),
     "netlist": ("Header", "deck", "subcircuit", "to_pyspice"),
     "fit": ("fit_network",),
-    "relaxation": ("relax",),
-    "study": ("run_study",),
-    "results": ("Record", "Study"),
-    "store": ("load_study",),
-    "errors": ("CircuittexError", "ConvergenceError", "DesignError"),
+    "relaxation.relax": ("relax",),
+    "study.run": ("run_study",),
+    "results.records": ("Record", "Study"),
+    "results.store": ("load_study",),
+    "base.errors": ("CircuittexError", "ConvergenceError", "DesignError"),
 }
 _HOME = {name: f"circuittex.{module}" for module, names in _HOMES.items() for name in names}
 
 __all__ = ["__version__", *_HOME]
 
 if TYPE_CHECKING:
-    from circuittex.circuit import Circuit as Circuit
-    from circuittex.circuit import build_circuit as build_circuit
-    from circuittex.circuit import reduced_circuit as reduced_circuit
-    from circuittex.circuit import yarn_end_terminals as yarn_end_terminals
+    from circuittex.base.errors import CircuittexError as CircuittexError
+    from circuittex.base.errors import ConvergenceError as ConvergenceError
+    from circuittex.base.errors import DesignError as DesignError
     from circuittex.contact.extract import contact_state as contact_state
     from circuittex.contact.extract import contacts_of as contacts_of
     from circuittex.contact.merge import simplify as simplify
@@ -45,10 +44,12 @@ if TYPE_CHECKING:
     from circuittex.design import parse_design as parse_design
     from circuittex.design import plain_weave as plain_weave
     from circuittex.design import starter as starter
-    from circuittex.errors import CircuittexError as CircuittexError
-    from circuittex.errors import ConvergenceError as ConvergenceError
-    from circuittex.errors import DesignError as DesignError
-    from circuittex.fields import solve_fields as solve_fields
+    from circuittex.electrical.fields import solve_fields as solve_fields
+    from circuittex.electrical.network.circuit import Circuit as Circuit
+    from circuittex.electrical.network.circuit import build_circuit as build_circuit
+    from circuittex.electrical.network.circuit import reduced_circuit as reduced_circuit
+    from circuittex.electrical.network.circuit import yarn_end_terminals as yarn_end_terminals
+    from circuittex.electrical.network.nodal import solve_nodal as solve_nodal
     from circuittex.fit import fit_network as fit_network
     from circuittex.geometry.weave import build_mesh as build_mesh
     from circuittex.mech.configuration import initial_configuration as initial_configuration
@@ -56,12 +57,11 @@ if TYPE_CHECKING:
     from circuittex.netlist import deck as deck
     from circuittex.netlist import subcircuit as subcircuit
     from circuittex.netlist import to_pyspice as to_pyspice
-    from circuittex.nodal import solve_nodal as solve_nodal
-    from circuittex.relaxation import relax as relax
-    from circuittex.results import Record as Record
-    from circuittex.results import Study as Study
-    from circuittex.store import load_study as load_study
-    from circuittex.study import run_study as run_study
+    from circuittex.relaxation.relax import relax as relax
+    from circuittex.results.records import Record as Record
+    from circuittex.results.records import Study as Study
+    from circuittex.results.store import load_study as load_study
+    from circuittex.study.run import run_study as run_study
 else:
 
     def __getattr__(name: str) -> Any:

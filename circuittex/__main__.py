@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from circuittex.cli import main
+from circuittex.command.cli import main
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -8,12 +8,12 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import least_squares
 
-from circuittex.circuit import reached_part, reduced_circuit, yarn_end_name
+from circuittex.base.arrays import Floats
+from circuittex.base.errors import CircuitError
+from circuittex.base.frozen import frozen
 from circuittex.design import Design
-from circuittex.errors import CircuitError
-from circuittex.frozen import frozen
-from circuittex.geometry.mesh import Floats
-from circuittex.nodal import solve_nodal
+from circuittex.electrical.network.circuit import reached_part, reduced_circuit, yarn_end_name
+from circuittex.electrical.network.nodal import solve_nodal
 
 # A conductance below this fraction of that of an insulated yarn is none: it is rounding of the solution.
 _NONE = 1e-12

@@ -13,13 +13,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from circuittex import __version__
-from circuittex.circuit import KINDS, Circuit, reached_part
-from circuittex.errors import CircuitError
-from circuittex.frozen import frozen
-from circuittex.netlist_reader import parse
-from circuittex.pyspice_export import to_pyspice
-from circuittex.spice_names import safe_name, unique_names
+from circuittex.base.errors import CircuitError
+from circuittex.base.frozen import frozen
+from circuittex.base.version import __version__
+from circuittex.electrical.network.circuit import KINDS, Circuit, reached_part
+from circuittex.electrical.spice.names import safe_name, unique_names
+from circuittex.electrical.spice.pyspice import to_pyspice
+from circuittex.electrical.spice.reader import parse
 
 __all__ = [
     "Header",
@@ -52,7 +52,7 @@ class Header:
 def pin_names(circuit: Circuit) -> tuple[str, ...]:
     """Return the word that stands for each port in a netlist, which is the word of its node.
 
-    >>> from circuittex.circuit import reduced_circuit
+    >>> from circuittex.electrical.network.circuit import reduced_circuit
     >>> pin_names(reduced_circuit((1, 1), 1.0, 1.0))
     ('warp1_minus', 'warp1_plus', 'weft1_minus', 'weft1_plus')
     """
@@ -79,7 +79,7 @@ def deck(circuit: Circuit, drive: Mapping[str, float], header: Header | None = N
     The source at a pin is called V and the pin: the current into the circuit there is minus the current of the source.
     What no driven port reaches is left out.
 
-    >>> from circuittex.circuit import reduced_circuit
+    >>> from circuittex.electrical.network.circuit import reduced_circuit
     >>> print(deck(reduced_circuit((1, 1), 2.0, 5.0), {"warp1_minus": 1.0, "warp1_plus": 0.0}).splitlines()[-4])
     Vwarp1_minus warp1_minus 0 1.0
     """

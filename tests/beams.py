@@ -13,14 +13,15 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
-from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
+from circuittex.base.arrays import Floats, Ints
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
-from circuittex.mech.equilibrium import Minimum, minimise
-from circuittex.mech.multifrontal import MultifrontalSolver
-from circuittex.mech.pattern import Pattern, build_pattern
-from circuittex.mech.space import DOFS, BeamSpace, beam_space
+from circuittex.mech.minimise import Minimum, minimise
+from circuittex.mech.space import BeamSpace, beam_space
 from circuittex.mech.terms import ForceTerm
+from circuittex.solvers.multifrontal import MultifrontalSolver
+from circuittex.solvers.pattern import DOFS, Pattern, build_pattern
 
 MODULUS = 10.0
 """E in MPa, that of the paper's fibrils."""

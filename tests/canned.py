@@ -10,13 +10,13 @@ import pytest
 from synthetic_study import synthetic_study
 
 from circuittex import __version__
-from circuittex.frozen import same
-from circuittex.geometry.mesh import Floats
-from circuittex.increment import Increment
+from circuittex.base.arrays import Floats
+from circuittex.base.frozen import same
 from circuittex.mech.configuration import Configuration
-from circuittex.plan import Step, plan
-from circuittex.relaxation import Equilibrium
-from circuittex.results import Record, Study
+from circuittex.relaxation.increment import Increment
+from circuittex.relaxation.relax import Equilibrium
+from circuittex.results.records import Record, Study
+from circuittex.study.plan import Step, plan
 
 
 def canned_study(states: int = 3, paths: tuple[str, ...] = ("stretch", "shear")) -> Study:
@@ -61,8 +61,8 @@ class Canned:
         """Take the place of the computations and of the report, whose drawing takes long."""
         for module in ("study", "schedule"):
             monkeypatch.setattr(f"circuittex.{module}.reach", self.reach)
-        monkeypatch.setattr("circuittex.schedule.record_state", self.record_state)
-        monkeypatch.setattr("circuittex.folder.write_report", report)
+        monkeypatch.setattr("circuittex.study.schedule.record_state", self.record_state)
+        monkeypatch.setattr("circuittex.study.folder.write_report", report)
         return self
 
 
@@ -80,7 +80,7 @@ def files(folder: Path) -> set[str]:
     return {
         path.relative_to(folder).as_posix()
         for path in folder.rglob("*")
-        if path.is_file() and path.name != ".circuittex.lock"
+        if path.is_file() and path.name != ".circuittex.base.lock"
     }
 
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from circuittex.circuit import Circuit
 from circuittex.contact.state import ContactState
 from circuittex.design import Terminal
+from circuittex.electrical.network.circuit import Circuit
 from circuittex.geometry.mesh import FibrilMesh
 
 NO_FIBRILS = np.empty(0, dtype=np.int64)

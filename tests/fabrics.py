@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicHermiteSpline
 
+from circuittex.base.arrays import Floats, Ints
 from circuittex.contact.penalty import PenaltyContact
 from circuittex.design import Design, plain_weave
-from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.order import reordered
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.space import beam_space
-from circuittex.relaxation import Equilibrium
+from circuittex.relaxation.relax import Equilibrium
 
 
 @dataclass

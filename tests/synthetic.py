@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from circuittex.base.arrays import Floats, Ints
 from circuittex.contact.state import ContactState
-from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
+from circuittex.geometry.mesh import FibrilMesh
 
 
 def fibrils(

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from circuittex.base.arrays import Floats
 from circuittex.contact.state import ContactState
 from circuittex.design import Design, Loading, design_hash, plain_weave
-from circuittex.fields import Fields
+from circuittex.electrical.fields import Fields
 from circuittex.fit import Fit
-from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
-from circuittex.results import Record, Study
-from circuittex.verify import Verification
+from circuittex.results.records import Record, Study
+from circuittex.study.verify import Verification
 
 INSULATED = 2.0 / (10 * np.pi * 0.15**2 * 10.0)
 """Ry of an insulated yarn segment of the paper's cell [57], ohm: 0.2829."""

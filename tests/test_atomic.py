@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from circuittex.atomic import replacing, write_text
+from circuittex.base.atomic import replacing, write_text
 
 
 @pytest.fixture

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 from fabrics import fibrils_through, straight
 
+from circuittex.base.errors import DesignError
 from circuittex.contact.curve import curve_table
 from circuittex.design import design_hash, load_design, parse_design, starter
-from circuittex.errors import DesignError
 from circuittex.geometry import build_mesh
 
 MISSING = object()

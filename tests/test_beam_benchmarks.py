@@ -37,7 +37,7 @@ from reference import (
 )
 from scipy.optimize import brentq
 
-from circuittex.geometry.mesh import Floats
+from circuittex.base.arrays import Floats
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.mech.space import BeamSpace, beam_space

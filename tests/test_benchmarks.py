@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from circuittex.circuit import reduced_circuit
 from circuittex.design import Design, plain_weave
+from circuittex.electrical.network.circuit import reduced_circuit
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 SCRIPTS = [
@@ -117,7 +117,7 @@ def test_network_agrees_with_ngspice() -> None:
 
 
 def test_first_run_compiles_and_the_second_does_not() -> None:
-    code = "import numpy as np\nfrom circuittex.mech.pattern import build_pattern as b\nb(2, np.array([[0, 1]]), "
+    code = "import numpy as np\nfrom circuittex.solvers.pattern import build_pattern as b\nb(2, np.array([[0, 1]]), "
     first, second, kernels = script("compile").first_and_second(code + "np.empty((0, 2), dtype=np.int64))")
     assert kernels == 1
     assert min(first, second) > 0

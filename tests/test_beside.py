@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from synthetic_study import synthetic_study
 
-from circuittex.cli import main
+from circuittex.command.cli import main
 from circuittex.design import plain_weave
-from circuittex.results import Study
-from circuittex.store import write_study_start
+from circuittex.results.records import Study
+from circuittex.results.store import write_study_start
 
 CODE = synthetic_study(3, contacts=10, paths=("stretch", "shear"))
 TABLE = replace(CODE, design=replace(CODE.design, weave=plain_weave("paper-table").weave))
@@ -21,7 +21,7 @@ OTHER_CELL = replace(CODE, design=replace(CODE.design, weave=replace(CODE.design
 
 @pytest.fixture(autouse=True)
 def _nothing_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(import_module("circuittex.report.page"), "save_figures", lambda study, folder: {})
+    monkeypatch.setattr(import_module("circuittex.results.report.page"), "save_figures", lambda study, folder: {})
 
 
 def stored(folder: Path, study: Study) -> str:

@@ -8,7 +8,7 @@ from math import inf, nan
 import numpy as np
 import pytest
 
-from circuittex.bifurcation import (
+from circuittex.results.bifurcation import (
     BranchCheck,
     Verdict,
     branch_statement,
@@ -16,7 +16,7 @@ from circuittex.bifurcation import (
     difference,
     force_difference,
 )
-from circuittex.outcome import Outcome
+from circuittex.results.outcome import Outcome
 
 OUTCOME = Outcome(np.array([[2.0, 0.1, 0.0], [0.001, 0.5, 0.0]]), (1.0, 0.01), 0.3, 300.0, 0.4)
 NOTHING = Outcome(np.full((2, 3), nan), (nan, nan), nan, nan, nan)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.linalg import cython_blas
 
-from circuittex.geometry.mesh import Floats
-from circuittex.mech.blas import _routine, cholesky, solve_border, subtract_products
+from circuittex.base.arrays import Floats
+from circuittex.solvers.blas import _routine, cholesky, solve_border, subtract_products
 
 ROUND_OFF = 1e-12
 """Relative: a few hundred operations for each value, and condition numbers of some hundred."""

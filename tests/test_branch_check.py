@@ -13,25 +13,25 @@ from canned import Canned, canned_study
 from fabrics import small_cell
 from synthetic_study import synthetic_study
 
-import circuittex.branch_check as module
-from circuittex.bifurcation import ALLOWED, BranchCheck, Verdict
-from circuittex.branch_check import another_order, check_branch
-from circuittex.cli import main
+import circuittex.study.branch_check as module
+from circuittex.base.errors import CircuitError, ConvergenceError
+from circuittex.base.frozen import same
+from circuittex.command.cli import main
 from circuittex.design import Design, Loading, starter, uniaxial
-from circuittex.discretisation import ErrorEstimate
-from circuittex.errors import CircuitError, ConvergenceError
-from circuittex.frozen import same
 from circuittex.geometry.mesh import FibrilMesh
-from circuittex.increment import Increment
 from circuittex.mech.configuration import Configuration
-from circuittex.mech.linear import LinearSolver
-from circuittex.mech.multifrontal import MultifrontalSolver
-from circuittex.plan import Step, plan
-from circuittex.record import reach
-from circuittex.relaxation import Equilibrium
-from circuittex.results import Record, Study
-from circuittex.store import load_study
-from circuittex.study import run_study
+from circuittex.relaxation.increment import Increment
+from circuittex.relaxation.relax import Equilibrium
+from circuittex.results.bifurcation import ALLOWED, BranchCheck, Verdict
+from circuittex.results.discretisation import ErrorEstimate
+from circuittex.results.records import Record, Study
+from circuittex.results.store import load_study
+from circuittex.solvers.linear import LinearSolver
+from circuittex.solvers.multifrontal import MultifrontalSolver
+from circuittex.study.branch_check import another_order, check_branch
+from circuittex.study.plan import Step, plan
+from circuittex.study.record import reach
+from circuittex.study.run import run_study
 
 Say = Callable[[str], None]
 PRESS = Loading("press", (((1.2, 0.0), (0.0, 1.2)), ((0.8, 0.0), (0.0, 1.2))), (0.2, -0.2))
@@ -212,7 +212,7 @@ def test_checks_and_error_estimates_in_one_run(canned: Study, tmp_path: Path, mo
     def estimate(design: Design, mesh: FibrilMesh, record: Record, solver: object, say: Say) -> ErrorEstimate:
         return ErrorEstimate(record.name, (10, 20, 40), (4, 8), np.zeros(3), (), ())
 
-    monkeypatch.setattr("circuittex.error_estimate.estimate_error", estimate)
+    monkeypatch.setattr("circuittex.study.error_estimate.estimate_error", estimate)
     study = run_study(canned.design, tmp_path, branches=True, error_estimate=True, workers=1)
     assert [check.state for check in study.branches] == STATES
     assert [found.state for found in study.errors] == ["relaxed", "stretch-0.05", "shear-0.05"]
@@ -236,7 +236,7 @@ def test_the_command_line_asks_for_checks(asked: list[str], tmp_path: Path, monk
         seen.append(branches)
         return synthetic_study(1, contacts=1, rows=(1,))
 
-    monkeypatch.setattr("circuittex.study.run_study", fake)
+    monkeypatch.setattr("circuittex.study.run.run_study", fake)
     (tmp_path / "weave.toml").write_text(starter(), encoding="utf-8")
     assert main(["run", str(tmp_path / "weave.toml"), "--out", str(tmp_path / "out"), "--quiet", *asked]) == 0
     assert seen == [bool(asked)]

@@ -12,7 +12,10 @@ from electrical_cases import end, fibrils, touching
 from electrical_reference import FOUR_DIGITS, INSULATED_SEGMENT_OHM, INSULATED_YARN_CURRENT
 from synthetic import woven
 
-from circuittex.circuit import (
+from circuittex.base.errors import CircuitError
+from circuittex.base.frozen import same
+from circuittex.design import Terminal, plain_weave
+from circuittex.electrical.network.circuit import (
     CONTACT,
     SEGMENT,
     build_circuit,
@@ -24,11 +27,8 @@ from circuittex.circuit import (
     to_networkx,
     yarn_end_terminals,
 )
-from circuittex.design import Terminal, plain_weave
-from circuittex.errors import CircuitError
-from circuittex.frozen import same
+from circuittex.electrical.network.nodal import solve_nodal
 from circuittex.geometry.weave import build_mesh
-from circuittex.nodal import solve_nodal
 
 ROUNDING = 1e-12  # relative; a handful of additions and one small solve
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from synthetic_study import INSULATED, synthetic_study
 
-from circuittex.claims import CLAIMS, currents, judge, mechanics, network, paper_study, parameter_set
-from circuittex.claims.claim import AGREES, Finding
-from circuittex.claims.table import claims_table
+from circuittex.base.arrays import Floats
 from circuittex.design import Loading, plain_weave, shear, uniaxial
-from circuittex.geometry.mesh import Floats
-from circuittex.results import Record, Study
+from circuittex.results.claims import CLAIMS, currents, judge, mechanics, network, paper_study, parameter_set
+from circuittex.results.claims.claim import AGREES, Finding
+from circuittex.results.claims.table import claims_table
+from circuittex.results.records import Record, Study
 
 STUDY = synthetic_study(11, contacts=60, paths=("stretch", "shear"))
 Change = Callable[[Record], Record]

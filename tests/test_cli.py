@@ -16,16 +16,16 @@ import pytest
 from synthetic_study import synthetic_study
 
 import circuittex
-from circuittex.circuit import CONTACT, Circuit
-from circuittex.cli import Progress, main
+from circuittex.base.errors import ConvergenceError
+from circuittex.base.lock import locked
+from circuittex.command.cli import Progress, main
 from circuittex.design import Design, load_design, starter
-from circuittex.errors import ConvergenceError
-from circuittex.lock import locked
+from circuittex.electrical.network.circuit import CONTACT, Circuit
+from circuittex.electrical.network.nodal import NodalSolution, solve_nodal
 from circuittex.netlist import parse, pin_names
-from circuittex.nodal import NodalSolution, solve_nodal
-from circuittex.results import Study
-from circuittex.store import load_study, write_study_start
-from circuittex.verify import Verification
+from circuittex.results.records import Study
+from circuittex.results.store import load_study, write_study_start
+from circuittex.study.verify import Verification
 
 COMMANDS = ["new", "run", "netlist", "verify", "report"]
 
@@ -46,7 +46,7 @@ def error_line(capsys: pytest.CaptureFixture[str]) -> str:
 
 
 def replace_study(monkeypatch: pytest.MonkeyPatch, function: Callable[..., Study]) -> None:
-    monkeypatch.setattr("circuittex.study.run_study", function)
+    monkeypatch.setattr("circuittex.study.run.run_study", function)
 
 
 # Help
@@ -101,7 +101,7 @@ def test_new_prints_a_design_that_loads(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 def test_broken_pipe_is_silent() -> None:
-    code = "import sys, circuittex.cli as c; sys.stdin.read(); sys.exit(c.main(['new']))"
+    code = "import sys, circuittex.command.cli as c; sys.stdin.read(); sys.exit(c.main(['new']))"
     process = subprocess.Popen(
         [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
@@ -356,7 +356,7 @@ def test_report_is_rebuilt_from_the_file_alone(
     computed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     # Drawing takes long and has tests of its own.
-    monkeypatch.setattr(import_module("circuittex.report.page"), "save_figures", lambda study, folder: {})
+    monkeypatch.setattr(import_module("circuittex.results.report.page"), "save_figures", lambda study, folder: {})
     assert main(["report", str(computed)]) == 0
     assert capsys.readouterr().out == f"{computed / 'report.html'}\n"
     assert "stretch-0.0250" in (computed / "report.html").read_text(encoding="utf-8")
@@ -433,7 +433,7 @@ def test_unknown_probe_names_the_known_ones(computed: Path, capsys: pytest.Captu
 def test_netlist_that_ngspice_would_not_finish_comes_with_a_note(
     computed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("circuittex.ngspice.feasible", lambda resistors: False)
+    monkeypatch.setattr("circuittex.electrical.spice.ngspice.feasible", lambda resistors: False)
     assert main(["netlist", str(computed)]) == 0
     assert "circuittex: note: " in capsys.readouterr().err
 
@@ -448,7 +448,7 @@ def test_verify_confirms_with_ngspice(computed: Path, capsys: pytest.CaptureFixt
 def test_verify_without_ngspice_is_no_confirmation(
     computed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("circuittex.ngspice.find_ngspice", lambda: None)
+    monkeypatch.setattr("circuittex.electrical.spice.ngspice.find_ngspice", lambda: None)
     assert main(["verify", str(computed), "--state", "relaxed"]) == 1
     assert "NOT confirmed" in capsys.readouterr().out
 
@@ -460,6 +460,6 @@ def test_verify_finds_a_route_that_disagrees(
         right = solve_nodal(circuit, drive)
         return NodalSolution(right.voltage * (1 + 1e-8), right.port_current * (1 + 1e-8))
 
-    monkeypatch.setattr("circuittex.verify.solve_nodal", wrong)
+    monkeypatch.setattr("circuittex.study.verify.solve_nodal", wrong)
     assert main(["verify", str(computed), "--state", "relaxed"]) == 1
     assert "NOT confirmed" in capsys.readouterr().out

@@ -9,11 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
+from circuittex.base.arrays import Floats
+from circuittex.base.errors import DesignError
 from circuittex.contact.closest import _closest
 from circuittex.contact.curve import BASIS, CurveTable, bezier, curve_table, evaluate
 from circuittex.contact.penalty import contact_points
-from circuittex.errors import DesignError
-from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.geometry.mesh import FibrilMesh
 
 ROUND_OFF = 1e-13  # of coordinates of a few mm
 

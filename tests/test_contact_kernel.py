@@ -10,9 +10,10 @@ from fabrics import contact_term, fibrils_through, renumbered, straight, tangle
 from hypothesis import given
 from hypothesis import strategies as st
 
+from circuittex.base.arrays import Floats
 from circuittex.contact.penalty import PenaltyContact
-from circuittex.geometry.mesh import FibrilMesh, Floats
-from circuittex.mech.pattern import Pattern, build_pattern, multiply
+from circuittex.geometry.mesh import FibrilMesh
+from circuittex.solvers.pattern import Pattern, build_pattern, multiply
 
 P, R = 5.0, 0.15
 

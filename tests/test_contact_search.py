@@ -11,9 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
+from circuittex.base.arrays import Floats
 from circuittex.contact.curve import CurveTable, bezier, curve_table
 from circuittex.contact.search import CONTROL_MOTION, Candidates, coupled_nodes, find_candidates
-from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.geometry.mesh import FibrilMesh
 
 SAMPLES = 17  # points of an interval in the brute-force check
 

@@ -17,6 +17,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from circuittex.base.errors import DesignError
+from circuittex.base.frozen import same
 from circuittex.design import (
     Design,
     Electrical,
@@ -37,8 +39,6 @@ from circuittex.design import (
     starter,
     uniaxial,
 )
-from circuittex.errors import DesignError
-from circuittex.frozen import same
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from circuittex.discretisation import ErrorEstimate, QuantityError, contact_error, mesh_error, observed_order
+from circuittex.results.discretisation import ErrorEstimate, QuantityError, contact_error, mesh_error, observed_order
 
 ROUNDING = 1e-6  # relative: errors of 1e-3 and more beside a limit of at most 100, in double precision
 limits = st.floats(-100, 100)

@@ -10,9 +10,9 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import circuittex.mech.dissection as dissection
-from circuittex.geometry.mesh import Floats, Ints
-from circuittex.mech.dissection import dissect, narrowed
+import circuittex.solvers.dissection as dissection
+from circuittex.base.arrays import Floats, Ints
+from circuittex.solvers.dissection import dissect, narrowed
 
 
 def lattice(side: int) -> tuple[sp.csr_array, Floats]:

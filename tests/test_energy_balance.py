@@ -13,22 +13,23 @@ import pytest
 from fabrics import small_cell
 from synthetic_study import synthetic_study
 
+from circuittex.base.arrays import Floats
+from circuittex.base.errors import DesignError
 from circuittex.contact.extract import contacts_of
 from circuittex.design import Design, load_unload, plain_weave, shear, uniaxial
-from circuittex.errors import DesignError
-from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
-from circuittex.increment import advance
 from circuittex.mech.configuration import Configuration, initial_configuration
-from circuittex.mech.multifrontal import MultifrontalSolver
-from circuittex.relaxation import Equilibrium, move, relax
-from circuittex.report.energy import energy_section
-from circuittex.report.table import number
-from circuittex.results import Record, Study
-from circuittex.store import load_study, write_study_start
-from circuittex.study import run_study
-from circuittex.summary import summary
-from circuittex.work import EnergyBalance, balance, clamp_balance, step_balances
+from circuittex.relaxation.increment import advance
+from circuittex.relaxation.relax import Equilibrium, move, relax
+from circuittex.results.records import Record, Study
+from circuittex.results.report.energy import energy_section
+from circuittex.results.report.table import number
+from circuittex.results.store import load_study, write_study_start
+from circuittex.results.summary import summary
+from circuittex.results.work import EnergyBalance, balance, clamp_balance, step_balances
+from circuittex.solvers.multifrontal import MultifrontalSolver
+from circuittex.study.run import run_study
 
 TOLERANCE = 1e-7  # N, largest free force
 SAME = 1e-5

@@ -20,26 +20,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-import circuittex.ensemble.run as run_module
-from circuittex.cli import main
+import circuittex.study.ensemble.run as run_module
+from circuittex.base.errors import ConvergenceError, DesignError, FolderError
+from circuittex.command.cli import main
 from circuittex.design import Design, design_hash, load_design, plain_weave, starter, uniaxial
 from circuittex.design.packing import Packing
-from circuittex.ensemble import Ensemble, percentiles, run_ensemble
-from circuittex.ensemble.figures import band_figures
-from circuittex.ensemble.files import COLUMNS, content, table
-from circuittex.ensemble.member import FILE, Outcome, compute_member, plain, read_outcome, write_outcome
-from circuittex.ensemble.page import page
-from circuittex.ensemble.perturbation import default_packing, member_design, member_seed, perturbed
-from circuittex.ensemble.quantities import quantities
-from circuittex.ensemble.result import BANDS
-from circuittex.ensemble.run import assembled
-from circuittex.errors import ConvergenceError, DesignError, FolderError
 from circuittex.geometry import build_mesh
 from circuittex.geometry.centre_lines import centre_lines
 from circuittex.geometry.overlap import check_overlaps
-from circuittex.plan import plan
-from circuittex.store import load_study
-from circuittex.study import run_study
+from circuittex.results.store import load_study
+from circuittex.study.ensemble import Ensemble, percentiles, run_ensemble
+from circuittex.study.ensemble.figures import band_figures
+from circuittex.study.ensemble.files import COLUMNS, content, table
+from circuittex.study.ensemble.member import FILE, Outcome, compute_member, plain, read_outcome, write_outcome
+from circuittex.study.ensemble.page import page
+from circuittex.study.ensemble.perturbation import default_packing, member_design, member_seed, perturbed
+from circuittex.study.ensemble.quantities import quantities
+from circuittex.study.ensemble.result import BANDS
+from circuittex.study.ensemble.run import assembled
+from circuittex.study.plan import plan
+from circuittex.study.run import run_study
 
 TINY = plain_weave(yarns=2, rows=(1,))
 TINY = replace(TINY, numerics=replace(TINY.numerics, elements=3))
@@ -140,7 +140,7 @@ def here(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
     monkeypatch.setattr(run_module, "local_client", lambda _: contextlib.nullcontext())
     monkeypatch.setattr(run_module, "each_result", each)
-    monkeypatch.setattr("circuittex.folder.write_report", lambda folder, study: folder)
+    monkeypatch.setattr("circuittex.study.folder.write_report", lambda folder, study: folder)
     return computed
 
 
@@ -166,8 +166,8 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
         ]
         return SimpleNamespace(records=records)
 
-    monkeypatch.setattr("circuittex.ensemble.member.run_study", draw_study)
-    monkeypatch.setattr("circuittex.ensemble.files.save_bands", lambda ensemble, folder: {})
+    monkeypatch.setattr("circuittex.study.ensemble.member.run_study", draw_study)
+    monkeypatch.setattr("circuittex.study.ensemble.files.save_bands", lambda ensemble, folder: {})
 
 
 def test_members_are_studies_of_their_own_seeds(here: list[str], tmp_path: Path) -> None:
@@ -267,8 +267,8 @@ def test_states_before_a_failure_count(tmp_path: Path, monkeypatch: pytest.Monke
         run_study(replace(design, loading=()), folder, workers=1)
         raise ConvergenceError("no equilibrium\nwas found")
 
-    monkeypatch.setattr("circuittex.folder.write_report", lambda folder, study: folder)
-    monkeypatch.setattr("circuittex.ensemble.member.run_study", gives_up)
+    monkeypatch.setattr("circuittex.study.folder.write_report", lambda folder, study: folder)
+    monkeypatch.setattr("circuittex.study.ensemble.member.run_study", gives_up)
     outcome = compute_member(member_design(perturbed(STRETCHED), 0), str(tmp_path / "0000"))
     assert outcome.failure == "no equilibrium was found"
     assert np.isfinite(outcome.values[0]).all()
@@ -281,7 +281,7 @@ def test_an_error_that_is_no_property_of_the_design_is_tried_again(
 ) -> None:
     with monkeypatch.context() as patch:
         patch.setattr(
-            "circuittex.ensemble.member.run_study", lambda *_, **__: (_ for _ in ()).throw(OSError("disk full"))
+            "circuittex.study.ensemble.member.run_study", lambda *_, **__: (_ for _ in ()).throw(OSError("disk full"))
         )
         ensemble = run_ensemble(TINY, tmp_path, members=2)
     assert ensemble.failures == ("OSError: disk full",) * 2
@@ -316,7 +316,7 @@ def test_another_ensemble_is_not_mixed_with_what_is_there(
     elif change == "design":
         design = replace(TINY, name="another")
     elif change == "version":
-        monkeypatch.setattr("circuittex.ensemble.files.__version__", "99.0")
+        monkeypatch.setattr("circuittex.study.ensemble.files.__version__", "99.0")
     with pytest.raises(FolderError, match="another version" if change == "version" else "another design hash"):
         run_ensemble(design, tmp_path, members=1, seed=1 if change == "seed" else None)
     assert here == []
@@ -468,7 +468,7 @@ def run_command(monkeypatch: pytest.MonkeyPatch, ensemble: Ensemble, *words: str
         taken.update(options, design=design, out=out)
         return ensemble
 
-    monkeypatch.setattr("circuittex.ensemble.command.run_ensemble", stand_in)
+    monkeypatch.setattr("circuittex.study.ensemble.command.run_ensemble", stand_in)
     return main(["ensemble", *words]), taken
 
 

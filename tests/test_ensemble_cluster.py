@@ -21,15 +21,15 @@ import distributed
 import numpy as np
 import pytest
 
-import circuittex.ensemble.cluster as cluster_module
+import circuittex.study.ensemble.cluster as cluster_module
+from circuittex.base.arrays import Floats
+from circuittex.base.errors import CircuittexError, DesignError, WorkerError
+from circuittex.base.lock import HOLDER
 from circuittex.design import plain_weave
-from circuittex.ensemble import run_ensemble
-from circuittex.ensemble.cluster import each_result, local_client, remote_client, sees
-from circuittex.ensemble.perturbation import member_design, perturbed
-from circuittex.errors import CircuittexError, DesignError, WorkerError
-from circuittex.geometry.mesh import Floats
-from circuittex.lock import HOLDER
-from circuittex.study import run_study
+from circuittex.study.ensemble import run_ensemble
+from circuittex.study.ensemble.cluster import each_result, local_client, remote_client, sees
+from circuittex.study.ensemble.perturbation import member_design, perturbed
+from circuittex.study.run import run_study
 
 # what Dask says on a machine without a network
 pytestmark = pytest.mark.filterwarnings("ignore:Couldn't detect a suitable IP address")
@@ -141,7 +141,7 @@ def test_members_run_on_a_scheduler_that_is_there(
     def refuse(design: object, folder: Path, **_: object) -> None:
         raise DesignError("packing.seed", threading.current_thread().name, "nothing")
 
-    monkeypatch.setattr("circuittex.ensemble.member.run_study", refuse)
+    monkeypatch.setattr("circuittex.study.ensemble.member.run_study", refuse)
     ensemble = run_ensemble(TINY, tmp_path, members=2, address=scheduler)
     assert all("Dask" in failure for failure in ensemble.failures)
     assert not list(tmp_path.glob(".seen-by-*"))

@@ -13,25 +13,25 @@ from canned import Canned, canned_study
 from fabrics import small_cell
 from synthetic_study import synthetic_study
 
-import circuittex.error_estimate as module
-from circuittex.cli import main
+import circuittex.study.error_estimate as module
+from circuittex.base.errors import CircuitError, ConvergenceError, DesignError
+from circuittex.base.frozen import same
+from circuittex.base.workers import completed
+from circuittex.command.cli import main
 from circuittex.contact.extract import contacts_of
 from circuittex.design import Design, starter, uniaxial
-from circuittex.discretisation import ErrorEstimate
-from circuittex.error_estimate import estimate_error, estimates, variants
-from circuittex.errors import CircuitError, ConvergenceError, DesignError
-from circuittex.fields import solve_probes
+from circuittex.electrical.fields import solve_probes
 from circuittex.fit import fit_network
-from circuittex.frozen import same
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration, initial_configuration
-from circuittex.mech.multifrontal import MultifrontalSolver
-from circuittex.relaxation import Equilibrium, clamp_force, relax
-from circuittex.results import Record, Study, with_finding
-from circuittex.store import load_study
-from circuittex.study import run_study
-from circuittex.transfer import transfer
-from circuittex.workers import completed
+from circuittex.relaxation.relax import Equilibrium, clamp_force, relax
+from circuittex.relaxation.transfer import transfer
+from circuittex.results.discretisation import ErrorEstimate
+from circuittex.results.records import Record, Study, with_finding
+from circuittex.results.store import load_study
+from circuittex.solvers.multifrontal import MultifrontalSolver
+from circuittex.study.error_estimate import estimate_error, estimates, variants
+from circuittex.study.run import run_study
 
 Cell = tuple[Design, FibrilMesh, Record]
 
@@ -254,7 +254,7 @@ def test_the_command_line_asks_for_estimates(asked: list[str], tmp_path: Path, m
         seen.append(error_estimate)
         return synthetic_study(1, contacts=1, rows=(1,))
 
-    monkeypatch.setattr("circuittex.study.run_study", fake)
+    monkeypatch.setattr("circuittex.study.run.run_study", fake)
     (tmp_path / "weave.toml").write_text(starter(), encoding="utf-8")
     assert main(["run", str(tmp_path / "weave.toml"), "--out", str(tmp_path / "out"), "--quiet", *asked]) == 0
     assert seen == [bool(asked)]

@@ -14,14 +14,14 @@ from fabrics import small_cell
 from circuittex.contact.extract import contacts_of
 from circuittex.contact.state import ContactState
 from circuittex.design import Design
-from circuittex.export import detailed_circuit, detailed_netlist, probe_netlist, reduced_netlist, simplified
+from circuittex.electrical.network.nodal import solve_nodal
+from circuittex.electrical.spice.ngspice import find_ngspice, read_raw
 from circuittex.fit import Fit
 from circuittex.mech.configuration import initial_configuration
-from circuittex.ngspice import find_ngspice, read_raw
-from circuittex.nodal import solve_nodal
-from circuittex.relaxation import move
-from circuittex.results import Study
-from circuittex.study import run_study
+from circuittex.relaxation.relax import move
+from circuittex.results.records import Study
+from circuittex.study.export import detailed_circuit, detailed_netlist, probe_netlist, reduced_netlist, simplified
+from circuittex.study.run import run_study
 
 PAGE = Path(__file__).parents[1] / "docs" / "netlist.md"
 FIT = Fit(0.3, 200.0, 0.0, np.zeros((2, 2)), "relative", (), np.zeros(3))

@@ -11,13 +11,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skfem import Basis, Element, ElementLineP1, ElementLineP2, MeshLine
 from synthetic import fibrils, rails, touching, woven
 
+from circuittex.base.errors import DesignError
 from circuittex.contact.state import ContactState
 from circuittex.design import Probe, Terminal
-from circuittex.errors import DesignError
-from circuittex.fields import Fields, solve_fields, solve_potentials, solve_probes
-from circuittex.fields.line import fibril_line
-from circuittex.fields.solution import Mesh
-from circuittex.fields.system import build_system, outflow
+from circuittex.electrical.fields import Fields, solve_fields, solve_potentials, solve_probes
+from circuittex.electrical.fields.line import fibril_line
+from circuittex.electrical.fields.solution import Mesh
+from circuittex.electrical.fields.system import build_system, outflow
 
 AREA = np.pi * 0.15**2
 

@@ -11,8 +11,8 @@ from electrical_reference import FOUR_DIGITS, INSULATED_SEGMENT_OHM, INSULATED_Y
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from circuittex.base.errors import CircuitError
 from circuittex.design import Probe, Terminal, plain_weave
-from circuittex.errors import CircuitError
 from circuittex.fit import fit_network, network_conductances
 
 DESIGN = plain_weave()

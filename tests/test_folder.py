@@ -12,15 +12,15 @@ from canned import Canned, canned_study, files, report
 from fabrics import small_cell
 from synthetic_study import synthetic_study
 
-from circuittex.errors import DesignError, FolderError
-from circuittex.export import simplified, write_netlists
-from circuittex.folder import keep_record, open_study
-from circuittex.frozen import same
-from circuittex.plot import FIGURES
-from circuittex.store import load_study, write_study_start
-from circuittex.study import run_study
-from circuittex.summary import write_summary
-from circuittex.vtu import write_collections, write_vtu
+from circuittex.base.errors import DesignError, FolderError
+from circuittex.base.frozen import same
+from circuittex.results.plot import FIGURES
+from circuittex.results.store import load_study, write_study_start
+from circuittex.results.summary import write_summary
+from circuittex.results.vtk.vtu import write_collections, write_vtu
+from circuittex.study.export import simplified, write_netlists
+from circuittex.study.folder import keep_record, open_study
+from circuittex.study.run import run_study
 
 FOREIGN = {
     "notes.txt": "mine",

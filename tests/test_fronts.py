@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-import circuittex.mech.elimination_tree as elimination_tree
-import circuittex.mech.fronts as fronts
+import circuittex.solvers.elimination_tree as elimination_tree
+import circuittex.solvers.fronts as fronts
+from circuittex.base.arrays import Ints
 from circuittex.design import plain_weave
-from circuittex.geometry.mesh import Ints
 from circuittex.geometry.weave import build_mesh
-from circuittex.mech.coupled import entries_of, pair_of_entry
-from circuittex.mech.dissection import minimum_degree
-from circuittex.mech.fronts import Analysis, Front
-from circuittex.mech.pattern import Pattern, build_pattern
+from circuittex.solvers.coupled import entries_of, pair_of_entry
+from circuittex.solvers.dissection import minimum_degree
+from circuittex.solvers.fronts import Analysis, Front
+from circuittex.solvers.pattern import Pattern, build_pattern
 
 NOTHING = np.empty((0, 2), dtype=np.int64)
 

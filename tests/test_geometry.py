@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
+from circuittex.base.arrays import Floats
+from circuittex.base.errors import DesignError
 from circuittex.design import Design, Numerics, plain_weave
-from circuittex.errors import DesignError
 from circuittex.geometry import FibrilMesh, build_mesh
 from circuittex.geometry.centre_lines import centre_lines, yarn_height
-from circuittex.geometry.mesh import Floats
 from circuittex.geometry.overlap import check_overlaps, near_pairs, segment_distance
 
 H, PITCH, CELL = 0.525, 2.0, 8.0  # mm, the paper's cell

@@ -10,16 +10,17 @@ import numpy as np
 import pytest
 from fabrics import small_cell
 
-from circuittex import increment
+from circuittex.base.arrays import Floats
+from circuittex.base.errors import ConvergenceError, DesignError
+from circuittex.base.frozen import same
 from circuittex.design import Design, Gradient, Loading, biaxial, load_unload, plain_weave, shear, uniaxial
-from circuittex.errors import ConvergenceError, DesignError
-from circuittex.frozen import same
-from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
-from circuittex.increment import Increment, advance
 from circuittex.mech.configuration import Configuration, initial_configuration
-from circuittex.mech.multifrontal import MultifrontalSolver
-from circuittex.relaxation import Equilibrium, clamp_force, relax
+from circuittex.relaxation import increment
+from circuittex.relaxation.increment import Increment, advance
+from circuittex.relaxation.relax import Equilibrium, clamp_force, relax
+from circuittex.solvers.multifrontal import MultifrontalSolver
 
 TIGHT = 1e-8  # N
 AREA = np.pi * 0.15**2  # mm2

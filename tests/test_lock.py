@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from circuittex.errors import FolderError
-from circuittex.lock import locked
+from circuittex.base.errors import FolderError
+from circuittex.base.lock import locked
 
 HOLD = """
 import sys
-from circuittex.lock import locked
+from circuittex.base.lock import locked
 with locked(sys.argv[1]):
     print("held", flush=True)
     sys.stdin.read()
@@ -53,4 +53,4 @@ def test_a_failure_inside_releases_it(tmp_path: Path) -> None:
     with pytest.raises(ZeroDivisionError), locked(tmp_path):
         raise ZeroDivisionError
     with locked(tmp_path):
-        assert {path.name for path in tmp_path.iterdir()} == {".circuittex.lock", ".circuittex.holder"}
+        assert {path.name for path in tmp_path.iterdir()} == {".circuittex.base.lock", ".circuittex.holder"}

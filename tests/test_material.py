@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from circuittex.geometry.mesh import Floats
+from circuittex.base.arrays import Floats
 from circuittex.mech.form import psi, stress, stress_change
 from circuittex.mech.material import bending_lambda, lame
 

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from synthetic import fibrils, touching, woven
 
+from circuittex.base.errors import DesignError
+from circuittex.base.frozen import same
 from circuittex.contact.merge import drop_vanishing, merge_contacts, simplify, snap_feet
 from circuittex.contact.state import ContactState
-from circuittex.errors import DesignError
-from circuittex.frozen import same
 
 COLUMNS = [f.name for f in fields(ContactState) if f.name not in ("mesh", "axial_factor")]
 LENGTHS = st.sampled_from([0.01, 0.1, 0.3, 1.0, 3.0])

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from test_fronts import patterns
 
-import circuittex.mech.elimination_tree as elimination_tree
-import circuittex.mech.fronts as fronts
-import circuittex.mech.multifrontal as multifrontal
-from circuittex.geometry.mesh import Floats, Ints
-from circuittex.mech.coupled import pair_of_entry
-from circuittex.mech.multifrontal import MultifrontalSolver
-from circuittex.mech.pattern import Pattern, build_pattern, diagonal
+import circuittex.solvers.elimination_tree as elimination_tree
+import circuittex.solvers.fronts as fronts
+import circuittex.solvers.multifrontal as multifrontal
+from circuittex.base.arrays import Floats, Ints
+from circuittex.solvers.coupled import pair_of_entry
+from circuittex.solvers.multifrontal import MultifrontalSolver
+from circuittex.solvers.pattern import Pattern, build_pattern, diagonal
 
 costs = st.sampled_from([0.0, 300.0, 3e4, elimination_tree.FRONT])
 """From one part a front to one front for all that is connected."""

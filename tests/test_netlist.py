@@ -16,9 +16,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from circuittex import __version__
-from circuittex.circuit import KINDS, Circuit, build_circuit, reached_part, reduced_circuit
-from circuittex.errors import CircuitError
-from circuittex.frozen import same
+from circuittex.base.errors import CircuitError
+from circuittex.base.frozen import same
+from circuittex.electrical.network.circuit import KINDS, Circuit, build_circuit, reached_part, reduced_circuit
+from circuittex.electrical.network.nodal import solve_nodal
+from circuittex.electrical.spice.names import safe_name, unique_names
+from circuittex.electrical.spice.ngspice import run_deck, run_decks
 from circuittex.netlist import (
     Header,
     deck,
@@ -27,9 +30,6 @@ from circuittex.netlist import (
     subcircuit,
     to_pyspice,
 )
-from circuittex.ngspice import run_deck, run_decks
-from circuittex.nodal import solve_nodal
-from circuittex.spice_names import safe_name, unique_names
 
 # ngspice solves a few dozen well-scaled resistors once, without refinement.
 SIMULATED = 1e-12
@@ -288,7 +288,7 @@ def test_ngspice_takes_a_subcircuit_with_hostile_names():
 
 PYSPICE = """
 import json, sys
-from circuittex.circuit import reduced_circuit
+from circuittex.electrical.network.circuit import reduced_circuit
 from circuittex.netlist import to_pyspice
 drive = {"warp3_minus": 1.0, "warp2_plus": 0.0}
 circuit = to_pyspice(reduced_circuit((4, 4), 0.2829, 10.0), drive)

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from circuittex.errors import NgspiceError
-from circuittex.ngspice import estimated_seconds, feasible, find_ngspice, read_raw, run_deck, run_decks
+from circuittex.base.errors import NgspiceError
+from circuittex.electrical.spice.ngspice import estimated_seconds, feasible, find_ngspice, read_raw, run_deck, run_decks
 
 DIVIDER = "* divider\nv1 top 0 1\nr1 top mid 1\nr2 mid 0 3\n.op\n.end\n"
 Fake = Callable[[str], None]
@@ -223,7 +223,7 @@ def test_a_full_disk_is_no_failure_of_ngspice(fake: Fake, monkeypatch: pytest.Mo
     """A study that meets it must stop and go on later, not record a state as unchecked for good."""
     fake("open('deck0.raw', 'wb').write(b'Title: cut sh')\n")
     usage = shutil.disk_usage("/")
-    monkeypatch.setattr("circuittex.ngspice.shutil.disk_usage", lambda _: usage._replace(free=1000))
+    monkeypatch.setattr("circuittex.electrical.spice.ngspice.shutil.disk_usage", lambda _: usage._replace(free=1000))
     with pytest.raises(OSError, match="No space left on device"):
         run_deck(DIVIDER)
     monkeypatch.undo()

@@ -20,11 +20,11 @@ from electrical_reference import (
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from circuittex.circuit import build_circuit, reduced_circuit
-from circuittex.errors import CircuitError
+from circuittex.base.errors import CircuitError
+from circuittex.electrical.network.circuit import build_circuit, reduced_circuit
+from circuittex.electrical.network.nodal import port_basis, rounding_errors, solve_drives, solve_nodal
+from circuittex.electrical.spice.ngspice import run_deck
 from circuittex.netlist import deck
-from circuittex.ngspice import run_deck
-from circuittex.nodal import port_basis, rounding_errors, solve_drives, solve_nodal
 
 EXACT = 1e-12  # relative: what the solution promises
 

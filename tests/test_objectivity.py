@@ -10,14 +10,15 @@ import pytest
 from fabrics import small_cell
 from scipy.spatial.transform import Rotation
 
+from circuittex.base.arrays import Floats
+from circuittex.base.frozen import same
 from circuittex.contact.extract import contacts_of
 from circuittex.contact.state import ContactState
 from circuittex.design import Design
-from circuittex.fields import solve_probes
-from circuittex.frozen import same
-from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.electrical.fields import solve_probes
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
-from circuittex.relaxation import Equilibrium, move, relax
+from circuittex.relaxation.relax import Equilibrium, move, relax
 
 TIGHT = 1e-9
 """N, largest free force asked for. Newton's method ends far below it."""

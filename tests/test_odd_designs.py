@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from fabrics import small_cell
 
+from circuittex.base.frozen import same
 from circuittex.design import Design, Yarn, plain_weave
-from circuittex.frozen import same
-from circuittex.results import Study
-from circuittex.store import load_study
-from circuittex.study import run_study
-from circuittex.summary import table
+from circuittex.results.records import Study
+from circuittex.results.store import load_study
+from circuittex.results.summary import table
+from circuittex.study.run import run_study
 
 
 def tiny() -> Design:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fabrics import small_cell
 
-from circuittex.frozen import same
+from circuittex.base.frozen import same
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.order import reordered
 

@@ -8,9 +8,9 @@ from dataclasses import astuple, replace
 import numpy as np
 import pytest
 
+from circuittex.base.errors import DesignError
 from circuittex.design import Design, Weave, design_hash, parse_design, plain_weave, starter
 from circuittex.design.packing import Packing
-from circuittex.errors import DesignError
 from circuittex.geometry import build_mesh
 from circuittex.geometry.centre_lines import CentreLines, centre_lines, yarn_height
 from circuittex.geometry.packing import draw, places_in_yarn, section_offsets

@@ -11,11 +11,11 @@ from fabrics import Cell
 
 from circuittex.contact.extract import contacts_of
 from circuittex.design import Design, plain_weave
-from circuittex.fields import solve_probes
+from circuittex.electrical.fields import solve_probes
 from circuittex.geometry.levels import levels
 from circuittex.geometry.weave import build_mesh
-from circuittex.increment import advance
-from circuittex.relaxation import clamp_force, relax
+from circuittex.relaxation.increment import advance
+from circuittex.relaxation.relax import clamp_force, relax
 
 MOST_ITERATIONS = 80
 """What a relaxation of this cell, and any step of 2.5 %, may take."""

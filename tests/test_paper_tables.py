@@ -10,8 +10,8 @@ from types import ModuleType
 import pytest
 from synthetic_study import synthetic_study
 
-from circuittex.claims import CLAIMS
 from circuittex.design import plain_weave
+from circuittex.results.claims import CLAIMS
 
 ROOT = Path(__file__).parents[1]
 STUDY = synthetic_study(3, contacts=40, paths=("stretch", "shear"))

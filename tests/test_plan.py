@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from circuittex.design import Loading, plain_weave, shear, uniaxial
-from circuittex.plan import plan, state_names
-from circuittex.spice_names import safe_name
+from circuittex.electrical.spice.names import safe_name
+from circuittex.study.plan import plan, state_names
 
 
 @pytest.mark.parametrize(

@@ -20,11 +20,12 @@ from matplotlib.figure import Figure
 from synthetic import fibrils
 from synthetic_study import INSULATED, synthetic_study
 
-from circuittex.discretisation import ErrorEstimate, QuantityError
-from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.base.arrays import Floats
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import initial_configuration
-from circuittex.paths import farthest, loading_paths, turns
-from circuittex.plot import (
+from circuittex.results.discretisation import ErrorEstimate, QuantityError
+from circuittex.results.paths import farthest, loading_paths, turns
+from circuittex.results.plot import (
     FIGURES,
     conductance_figure,
     force_figure,
@@ -34,11 +35,11 @@ from circuittex.plot import (
     section_figure,
     strained_figure,
 )
-from circuittex.plot.cut import cut
-from circuittex.plot.scene import camera, draw_tubes
-from circuittex.plot.style import COLOURS, save, style
-from circuittex.results import Study
-from circuittex.store.archive import Digests
+from circuittex.results.plot.cut import cut
+from circuittex.results.plot.scene import camera, draw_tubes
+from circuittex.results.plot.style import COLOURS, save, style
+from circuittex.results.records import Study
+from circuittex.results.store.archive import Digests
 
 STUDY = synthetic_study(2, contacts=40, rows=(3,), paths=("stretch", "shear"))
 SVG = "{http://www.w3.org/2000/svg}"
@@ -74,7 +75,7 @@ def test_nothing_global_is_touched() -> None:
         FIGURES[name](STUDY)
     assert dict(mpl.rcParams) == before
     assert Digests()(STUDY) == digest
-    code = "import sys, circuittex.plot; assert 'matplotlib.pyplot' not in sys.modules"
+    code = "import sys, circuittex.results.plot; assert 'matplotlib.pyplot' not in sys.modules"
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
 
 

@@ -13,11 +13,11 @@ from synthetic_study import synthetic_study
 from test_stored_errors import made_up
 from test_summary import disagreeing, unchecked
 
-from circuittex.claims import CLAIMS
 from circuittex.design import Packing, Terminal, uniaxial
-from circuittex.plot import FIGURES
-from circuittex.report import page, write_report
-from circuittex.results import Study
+from circuittex.results.claims import CLAIMS
+from circuittex.results.plot import FIGURES
+from circuittex.results.records import Study
+from circuittex.results.report import page, write_report
 
 PNG = b"\x89PNG\r\n\x1a\nno real picture"
 STUDY = synthetic_study(3, contacts=40, name="<b>A & \"B\"</b> $HOME 'x'")

@@ -10,13 +10,13 @@ from canned import Canned, canned_study
 from hypothesis import given
 from hypothesis import strategies as st
 
-from circuittex import schedule
-from circuittex.errors import CircuittexError, ConvergenceError
-from circuittex.frozen import same
-from circuittex.mech.multifrontal import MultifrontalSolver
-from circuittex.plan import plan
-from circuittex.results import Record, Study
-from circuittex.schedule import compute
+from circuittex.base.errors import CircuittexError, ConvergenceError
+from circuittex.base.frozen import same
+from circuittex.results.records import Record, Study
+from circuittex.solvers.multifrontal import MultifrontalSolver
+from circuittex.study import schedule
+from circuittex.study.plan import plan
+from circuittex.study.schedule import compute
 
 STUDY = canned_study(4)
 NAMES = [record.name for record in STUDY.records]

@@ -18,11 +18,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from synthetic_study import synthetic_study
 
-from circuittex.errors import StoreError
-from circuittex.frozen import frozen, same
-from circuittex.results import Study
-from circuittex.store import append_record, load_study, write_study_start
-from circuittex.store.archive import Digests, Reader, Writer, registry
+from circuittex.base.errors import StoreError
+from circuittex.base.frozen import frozen, same
+from circuittex.results.records import Study
+from circuittex.results.store import append_record, load_study, write_study_start
+from circuittex.results.store.archive import Digests, Reader, Writer, registry
 
 STUDY = synthetic_study(2, contacts=40)
 
@@ -243,7 +243,7 @@ def test_full_disk_leaves_the_old_file(stored: Path, monkeypatch: pytest.MonkeyP
 CHILD = """
 import sys
 from pathlib import Path
-from circuittex.store import append_record, load_study
+from circuittex.results.store import append_record, load_study
 path = Path(sys.argv[1])
 record = load_study(path).records[0]
 for count in range(1000):

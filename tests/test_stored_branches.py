@@ -14,17 +14,17 @@ import pytest
 from matplotlib.axes import Axes
 from synthetic_study import synthetic_study
 
-from circuittex.bifurcation import BranchCheck
-from circuittex.errors import StoreError
-from circuittex.frozen import same
-from circuittex.outcome import Outcome
-from circuittex.plot import FIGURES
-from circuittex.plot.curves import conductance_figure, force_figure, network_figure
-from circuittex.plot.style import COLOURS
-from circuittex.report.page import page
-from circuittex.results import Record, Study, with_finding
-from circuittex.store import append_finding, load_study, write_study_start
-from circuittex.summary import summary, table, write_summary
+from circuittex.base.errors import StoreError
+from circuittex.base.frozen import same
+from circuittex.results.bifurcation import BranchCheck
+from circuittex.results.outcome import Outcome
+from circuittex.results.plot import FIGURES
+from circuittex.results.plot.curves import conductance_figure, force_figure, network_figure
+from circuittex.results.plot.style import COLOURS
+from circuittex.results.records import Record, Study, with_finding
+from circuittex.results.report.page import page
+from circuittex.results.store import append_finding, load_study, write_study_start
+from circuittex.results.summary import summary, table, write_summary
 
 STUDY = synthetic_study(3, contacts=5, rows=(1,), paths=("stretch", "shear"))
 REST, FIRST, FORK, LOST, LAST = STUDY.records

@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from synthetic_study import synthetic_study
 
-from circuittex.discretisation import ErrorEstimate, QuantityError
-from circuittex.errors import StoreError
-from circuittex.frozen import same
-from circuittex.report.errors import error_section
-from circuittex.report.page import page
-from circuittex.results import Study
-from circuittex.store import append_finding, load_study, write_study_start
-from circuittex.summary import summary, table, write_summary
+from circuittex.base.errors import StoreError
+from circuittex.base.frozen import same
+from circuittex.results.discretisation import ErrorEstimate, QuantityError
+from circuittex.results.records import Study
+from circuittex.results.report.errors import error_section
+from circuittex.results.report.page import page
+from circuittex.results.store import append_finding, load_study, write_study_start
+from circuittex.results.summary import summary, table, write_summary
 
 NAMES = ("Fx warp N", "Fy weft N", "I straight A", "I parallel A", "I perpendicular A", "Ry ohm", "Rc ohm")
 

@@ -17,15 +17,15 @@ import pytest
 from canned import Canned, canned_study, files, report, untimed
 from fabrics import small_cell
 
-from circuittex.compiled import available_cores
+from circuittex.base.compiled import available_cores
+from circuittex.base.errors import ConvergenceError, DesignError, FolderError, StoreError
+from circuittex.base.frozen import same
+from circuittex.base.lock import locked
 from circuittex.design import Design, equal_steps, shear, uniaxial
-from circuittex.errors import ConvergenceError, DesignError, FolderError, StoreError
-from circuittex.frozen import same
-from circuittex.lock import locked
-from circuittex.mech.multifrontal import MultifrontalSolver
-from circuittex.store import load_study
-from circuittex.store.archive import Digests
-from circuittex.study import run_study
+from circuittex.results.store import load_study
+from circuittex.results.store.archive import Digests
+from circuittex.solvers.multifrontal import MultifrontalSolver
+from circuittex.study.run import run_study
 
 STUDY = canned_study(2)
 PATIENCE = 600.0
@@ -95,11 +95,11 @@ def test_killed_between_any_two_changes_of_the_disk(
 RUN = """
 import sys
 sys.path.insert(0, sys.argv[1])
-import circuittex.folder
+import circuittex.study.folder
 import test_study
 from canned import report
-circuittex.folder.write_report = report
-from circuittex.study import run_study
+circuittex.study.folder.write_report = report
+from circuittex.study.run import run_study
 run_study(test_study.cell(), sys.argv[2], workers=int(sys.argv[3]))
 """
 
@@ -131,7 +131,7 @@ def test_interrupted_then_killed_then_completed_by_other_numbers_of_workers(
             assert process.wait(PATIENCE) != 0
         assert states(tmp_path) > kept  # no state that was there is lost
         kept = states(tmp_path)
-    monkeypatch.setattr("circuittex.folder.write_report", report)
+    monkeypatch.setattr("circuittex.study.folder.write_report", report)
     run_study(cell(), tmp_path, workers=1)
     found, whole = untimed(load_study(tmp_path / "results.h5")), untimed(run_study(cell(), workers=1))
     assert same(found, whole)
@@ -162,7 +162,7 @@ def test_workers_are_a_whole_number(workers: object, tmp_path: Path) -> None:
 def test_one_path_needs_no_other_process(monkeypatch: pytest.MonkeyPatch) -> None:
     study = canned_study(3, ("stretch",))
     Canned(study).install(monkeypatch)
-    monkeypatch.setattr("circuittex.study.Pool", None)
+    monkeypatch.setattr("circuittex.study.run.Pool", None)
     assert same(run_study(study.design, workers=8), study)
     assert available_cores() >= 1
 

@@ -13,10 +13,10 @@ import pytest
 from synthetic import fibrils
 from synthetic_study import INSULATED, synthetic_study
 
-import circuittex.summary as summary_module
-from circuittex.frozen import same
-from circuittex.results import Study
-from circuittex.summary import effort, insulated_resistance, ngspice_statement, summary, table, write_summary
+import circuittex.results.summary as summary_module
+from circuittex.base.frozen import same
+from circuittex.results.records import Study
+from circuittex.results.summary import effort, insulated_resistance, ngspice_statement, summary, table, write_summary
 
 STUDY = synthetic_study(3, contacts=40)
 

@@ -8,9 +8,10 @@ from fabrics import small_cell
 from scipy.interpolate import BarycentricInterpolator
 from scipy.spatial.transform import Rotation
 
-from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.base.arrays import Floats
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration, initial_configuration
-from circuittex.transfer import transfer
+from circuittex.relaxation.transfer import transfer
 
 ROUNDING = 1e-13  # relative, of a few products of numbers of order one to ten
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from circuittex.errors import DesignError
-from circuittex.units import parse
+from circuittex.base.errors import DesignError
+from circuittex.design.units import parse
 
 SPELLINGS = [
     ("0.15 mm", "mm", 0.15),

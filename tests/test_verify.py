@@ -11,14 +11,14 @@ import pytest
 from numpy.testing import assert_allclose
 from synthetic import fibrils, rails, touching, woven
 
-from circuittex import verify as module
-from circuittex.circuit import build_circuit
 from circuittex.contact.merge import simplify
 from circuittex.contact.state import ContactState
 from circuittex.design import Probe, Terminal
-from circuittex.fields import solve_fields, solve_probes
-from circuittex.nodal import NodalSolution, solve_nodal
-from circuittex.verify import verify
+from circuittex.electrical.fields import solve_fields, solve_probes
+from circuittex.electrical.network.circuit import build_circuit
+from circuittex.electrical.network.nodal import NodalSolution, solve_nodal
+from circuittex.study import verify as module
+from circuittex.study.verify import verify
 
 TERMINALS = (
     Terminal("left", (("warp2", -1),)),

@@ -12,11 +12,12 @@ import pytest
 from synthetic import fibrils, touching
 from synthetic_study import synthetic_study
 
-from circuittex import tubes
-from circuittex.fields import Fields
-from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.base.arrays import Floats
+from circuittex.electrical.fields import Fields
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import initial_configuration
-from circuittex.vtu import write_collections, write_pvd, write_vtu
+from circuittex.results.vtk import tubes
+from circuittex.results.vtk.vtu import write_collections, write_pvd, write_vtu
 
 STUDY = synthetic_study(2, contacts=200)
 TWO = fibrils([2.0, 3.0], elements=4)

@@ -11,26 +11,27 @@ import numpy as np
 import pytest
 from fabrics import Cell, fibrils_through, renumbered, small_cell, straight
 
-from circuittex.circuit import CONTACT, build_circuit
+from circuittex.base.arrays import Floats
+from circuittex.base.frozen import same
 from circuittex.contact.extract import contact_state
 from circuittex.contact.law import hertz_width
 from circuittex.contact.merge import snap_feet
 from circuittex.contact.state import ContactState
 from circuittex.design import ContactLaw, Probe, Terminal, plain_weave, uniaxial
-from circuittex.fields import Fields, solve_probes
+from circuittex.electrical.fields import Fields, solve_probes
+from circuittex.electrical.network.circuit import CONTACT, build_circuit
+from circuittex.electrical.network.nodal import solve_nodal
+from circuittex.electrical.spice.ngspice import run_deck
 from circuittex.fit import fit_network
-from circuittex.frozen import same
-from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.netlist import deck, parse
-from circuittex.ngspice import run_deck
-from circuittex.nodal import solve_nodal
-from circuittex.relaxation import clamp_force, move, relax
-from circuittex.results import Study
-from circuittex.store import load_study
-from circuittex.study import run_study
-from circuittex.summary import summary
+from circuittex.relaxation.relax import clamp_force, move, relax
+from circuittex.results.records import Study
+from circuittex.results.store import load_study
+from circuittex.results.summary import summary
+from circuittex.study.run import run_study
 
 STRETCHED = np.diag([1.05, 1.0])
 

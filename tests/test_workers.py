@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from circuittex.errors import ConvergenceError, DesignError, WorkerError
+from circuittex.base.errors import ConvergenceError, DesignError, WorkerError
+from circuittex.base.workers import GRACE, THREADS, Computers, Here, Pool
 from circuittex.mech.configuration import Configuration
-from circuittex.workers import GRACE, THREADS, Computers, Here, Pool
 
 PATIENCE = 60.0
 """Seconds within which a process must have ended on a machine that is busy."""
@@ -179,7 +179,7 @@ import sys
 sys.path.insert(0, sys.argv[1])
 import test_workers
 from circuittex.mech.configuration import Configuration
-from circuittex.workers import Pool
+from circuittex.base.workers import Pool
 pool = Pool(2, 1, print)
 pool.submit("a", test_workers.spin, sys.argv[2])
 pool.submit("b", test_workers.spin, sys.argv[2])

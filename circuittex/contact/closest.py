@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from circuittex.compiled import compiled
+from circuittex.base.compiled import compiled
 from circuittex.contact.curve import evaluate
 
 MAX_STEPS = 60

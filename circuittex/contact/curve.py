@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from circuittex.compiled import compiled
-from circuittex.errors import DesignError
-from circuittex.frozen import frozen
-from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
+from circuittex.base.arrays import Floats, Ints
+from circuittex.base.compiled import compiled
+from circuittex.base.errors import DesignError
+from circuittex.base.frozen import frozen
+from circuittex.geometry.mesh import FibrilMesh
 
 BASIS = np.array(
     [

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from circuittex.base.arrays import Floats
 from circuittex.contact.law import effective_modulus, effective_radius, hertz_width
 from circuittex.contact.penalty import PenaltyContact
 from circuittex.contact.state import ContactState
 from circuittex.design import ContactLaw, Design
-from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.space import BeamSpace, beam_space
 

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from circuittex.compiled import compiled
+from circuittex.base.compiled import compiled
 from circuittex.contact.curve import weights
-from circuittex.mech.pattern import find_neighbour
+from circuittex.solvers.pattern import find_neighbour
 
 
 @compiled

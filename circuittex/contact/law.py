@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from circuittex.geometry.mesh import Floats
+from circuittex.base.arrays import Floats
 
 
 def effective_modulus(e1: Floats, nu1: Floats, e2: Floats, nu2: Floats) -> Floats:

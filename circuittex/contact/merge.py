@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from circuittex.base.arrays import Floats, Ints
+from circuittex.base.errors import DesignError
+from circuittex.base.frozen import frozen
 from circuittex.contact.state import ContactState
-from circuittex.errors import DesignError
-from circuittex.frozen import frozen
-from circuittex.geometry.mesh import Floats, Ints
 
 
 @frozen

@@ -6,14 +6,15 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from circuittex.compiled import cores, side_by_side
+from circuittex.base.arrays import Floats, Ints
+from circuittex.base.compiled import cores, side_by_side
+from circuittex.base.frozen import frozen
 from circuittex.contact.closest import find_contacts
 from circuittex.contact.curve import BASIS, CurveTable, bezier, curve_table
 from circuittex.contact.kernels import add_contacts
 from circuittex.contact.search import CONTROL_MOTION, Candidates, coupled_nodes, find_candidates
-from circuittex.frozen import frozen
-from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
-from circuittex.mech.pattern import Pattern
+from circuittex.geometry.mesh import FibrilMesh
+from circuittex.solvers.pattern import Pattern
 
 WORTH_A_THREAD = 2000
 """Contacts that are worth a thread of their own."""

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from circuittex.base.arrays import Floats, Ints
+from circuittex.base.frozen import frozen
 from circuittex.contact.curve import CurveTable, bezier
-from circuittex.frozen import frozen
-from circuittex.geometry.mesh import Floats, Ints
-from circuittex.mech.pattern import distinct, ranges
+from circuittex.solvers.pattern import distinct, ranges
 
 CONTROL_MOTION = 4 / 3
 """A Bézier point moves at most this times as far as the nodes that define it (the sum of its weights' magnitudes)."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from circuittex.frozen import frozen
-from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
+from circuittex.base.arrays import Floats, Ints
+from circuittex.base.frozen import frozen
+from circuittex.geometry.mesh import FibrilMesh
 
 
 @frozen

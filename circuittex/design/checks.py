@@ -8,7 +8,7 @@ from numbers import Real
 from operator import index
 from typing import Any, SupportsIndex
 
-from circuittex.errors import DesignError
+from circuittex.base.errors import DesignError
 
 _NAME_RULE = "a name is a letter followed by at most 39 letters, digits, '_' or '-' (ASCII)"
 LARGEST = 1e12

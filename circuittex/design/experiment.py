@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from fractions import Fraction
 from math import inf
 
+from circuittex.base.frozen import frozen
 from circuittex.design.checks import name, one_of, real, refuse, store
-from circuittex.frozen import frozen
 
 Gradient = tuple[tuple[float, float], tuple[float, float]]
 """In-plane deformation gradient ((Fxx, Fxy), (Fyx, Fyy))."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import pi
 
+from circuittex.base.frozen import frozen
 from circuittex.design.checks import name, real, refuse, store, whole
-from circuittex.frozen import frozen
 
 MOST_FIBRILS = 10_000
 """Fibrils of one yarn."""

@@ -8,10 +8,10 @@ from importlib.resources import files
 from os import PathLike
 from pathlib import Path
 
+from circuittex.base.errors import DesignError
 from circuittex.design.checks import refuse
 from circuittex.design.reader import read_design
 from circuittex.design.statement import Design
-from circuittex.errors import DesignError
 
 _LARGEST_FILE = 10_000_000  # bytes; a draft of a thousand by a thousand yarns takes a third of it
 
@@ -44,7 +44,7 @@ def parse_design(mapping: Mapping[str, object]) -> Design:
 
     >>> parse_design({"format": 1, "nam": "x"})
     Traceback (most recent call last):
-    circuittex.errors.DesignError: nam: 'x' is not usable; it is an unknown key, did you mean 'name'?
+    circuittex.base.errors.DesignError: nam: 'x' is not usable; it is an unknown key, did you mean 'name'?
     """
     return read_design(mapping)
 
@@ -55,7 +55,7 @@ def starter() -> str:
     >>> parse_design(tomllib.loads(starter())).weave.yarn_names[0]
     'warp1'
     """
-    return files("circuittex").joinpath("data/starter.toml").read_text(encoding="utf-8")
+    return files("circuittex.design").joinpath("data/starter.toml").read_text(encoding="utf-8")
 
 
 def _toml(text: str) -> Mapping[str, object]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from circuittex.base.frozen import frozen
 from circuittex.design.checks import real, store, whole
-from circuittex.frozen import frozen
 
 MOST_SEED = 2**63 - 1
 """The largest whole number of TOML and HDF5."""

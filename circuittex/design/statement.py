@@ -6,11 +6,11 @@ import hashlib
 import json
 from dataclasses import fields, is_dataclass
 
+from circuittex.base.frozen import frozen
 from circuittex.design.checks import distinct, one_of, real, refuse, store, title, truth, whole
 from circuittex.design.experiment import Loading, Probe, Terminal
 from circuittex.design.fabric import ContactLaw, Weave
 from circuittex.design.packing import Packing
-from circuittex.frozen import frozen
 
 FORMAT = 1
 """The layout described by the starter design."""

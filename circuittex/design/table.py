@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from difflib import get_close_matches
 
-from circuittex import units
+from circuittex.design import units
 from circuittex.design.checks import NOTHING, refuse
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)

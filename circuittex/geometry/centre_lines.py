@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from circuittex.base.arrays import Floats, Ints
+from circuittex.base.frozen import frozen
 from circuittex.design import Weave
 from circuittex.design.packing import Packing
-from circuittex.frozen import frozen
-from circuittex.geometry.mesh import Floats, Ints
 from circuittex.geometry.packing import centred, draw, places_in_yarn
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.base.arrays import Floats
+from circuittex.geometry.mesh import FibrilMesh
 
 
 def levels(mesh: FibrilMesh, r: Floats, yarn: int, place: float) -> int:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from circuittex.frozen import frozen
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from circuittex.base.arrays import Floats, Ints
+from circuittex.base.frozen import frozen
 
 
 @frozen

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from circuittex.geometry.mesh import FibrilMesh, Ints
+from circuittex.base.arrays import Ints
+from circuittex.geometry.mesh import FibrilMesh
 
 
 def reordered(mesh: FibrilMesh, order: Ints) -> tuple[FibrilMesh, Ints]:

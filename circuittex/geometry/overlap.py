@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
+from circuittex.base.arrays import Floats, Ints
+from circuittex.base.errors import DesignError
 from circuittex.design import Weave
 from circuittex.design.packing import Packing
-from circuittex.errors import DesignError
 from circuittex.geometry.centre_lines import centre_lines
-from circuittex.geometry.mesh import Floats, Ints
 
 _SAMPLES = 16  # chords a crossing; in the paper's cell they leave the curve by 0.003 mm at the most
 _CHUNK = 50_000  # chords searched at a time, which bounds the memory

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from circuittex.base.arrays import Floats
+from circuittex.base.frozen import frozen
 from circuittex.design import Weave, Yarn
 from circuittex.design.packing import Packing
-from circuittex.frozen import frozen
-from circuittex.geometry.mesh import Floats
 
 
 @frozen

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.base.arrays import Floats
+from circuittex.geometry.mesh import FibrilMesh
 
 
 def refined(mesh: FibrilMesh, pieces: int) -> FibrilMesh:

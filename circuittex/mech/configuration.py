@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from circuittex.frozen import frozen
-from circuittex.geometry.mesh import FibrilMesh, Floats
+from circuittex.base.arrays import Floats
+from circuittex.base.frozen import frozen
+from circuittex.geometry.mesh import FibrilMesh
 
 
 @frozen

@@ -23,15 +23,15 @@ from math import ceil
 
 import numpy as np
 
-from circuittex.errors import ConvergenceError, DesignError
-from circuittex.frozen import frozen
-from circuittex.geometry.mesh import Floats, Ints
+from circuittex.base.arrays import Floats, Ints
+from circuittex.base.errors import ConvergenceError, DesignError
+from circuittex.base.frozen import frozen
 from circuittex.mech.beam import Beam
-from circuittex.mech.equilibrium import minimise
-from circuittex.mech.linear import LinearSolver
-from circuittex.mech.pattern import Pattern, multiply
-from circuittex.mech.space import DOFS, BeamSpace
+from circuittex.mech.minimise import minimise
+from circuittex.mech.space import BeamSpace
 from circuittex.mech.terms import ForceTerm
+from circuittex.solvers.linear import LinearSolver
+from circuittex.solvers.pattern import DOFS, Pattern, multiply
 
 NEWTON = 1e-6
 """N in one g mm/s2: turns the mass matrix into N s2/mm."""

@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 import skfem
 
-from circuittex.frozen import frozen
-from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
+from circuittex.base.arrays import Floats, Ints
+from circuittex.base.frozen import frozen
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.material import bending_lambda, lame
 from circuittex.mech.section import disk_rule
-from circuittex.mech.space import ALONG, DOFS, beam_space, vector_basis
+from circuittex.mech.space import ALONG, beam_space, vector_basis
+from circuittex.solvers.pattern import DOFS
 
 
 @frozen

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from circuittex.compiled import compiled
+from circuittex.base.compiled import compiled
 
 N_STRAINS = 5
 LEAST, LARGEST = 0.64, 1.5625

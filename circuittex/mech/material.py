@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from circuittex.geometry.mesh import Floats
+from circuittex.base.arrays import Floats
 
 
 def lame(youngs_modulus: Floats, poisson_ratio: Floats) -> tuple[Floats, Floats]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from circuittex.geometry.mesh import Floats
+from circuittex.base.arrays import Floats
 
 
 def disk_rule(degree: int) -> tuple[Floats, Floats]:

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import skfem
 
+from circuittex.base.arrays import Floats, Ints
+from circuittex.base.frozen import frozen
 from circuittex.design.checks import one_of
-from circuittex.frozen import frozen
-from circuittex.geometry.mesh import FibrilMesh, Floats, Ints
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
+from circuittex.solvers.pattern import DOFS
 
-DOFS = 9
-"""Unknowns of a node: r, g1, g2."""
 ALONG = {1: [0, 1], 2: [0, 2, 1]}
 """scikit-fem's numbers of the nodes along an element, for each order: a middle node is its last."""
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from circuittex.compiled import compiled
+from circuittex.base.compiled import compiled
 from circuittex.mech.kernels import N_STRAINS, energy, moments, section, strains
 
 WIDTH = 32

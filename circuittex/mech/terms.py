@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from circuittex.geometry.mesh import Floats, Ints
-from circuittex.mech.pattern import Pattern
+from circuittex.base.arrays import Floats, Ints
+from circuittex.solvers.pattern import Pattern
 
 
 class ForceTerm(Protocol):

@@ -1,0 +1,212 @@
+"""What the command line understands: its commands, their options, and their help."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from circuittex.base.version import __version__
+
+if TYPE_CHECKING:
+    Commands = argparse._SubParsersAction[argparse.ArgumentParser]
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The parser of all commands."""
+    parser = argparse.ArgumentParser(
+        prog="circuittex",
+        description=(
+            "From the fibrils of an electronic textile to SPICE netlists: relaxes and stretches a woven cell,\n"
+            "turns every recorded state into a resistor network, checks it, and fits the resistance of a\n"
+            "yarn segment (Ry) and of a crossing (Rc)."
+        ),
+        epilog=(
+            "a first study:\n"
+            "  circuittex new > weave.toml\n"
+            "  circuittex run weave.toml --out results/weave\n"
+            "then open results/weave/report.html. 'circuittex COMMAND --help' explains a command.\n\n"
+            "exit codes: 0 done, 1 routes disagree ('run', 'verify'), 2 unusable input, 130 interrupted"
+        ),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"circuittex {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    _add_new(commands)
+    _add_run(commands)
+    _add_netlist(commands)
+    _add_verify(commands)
+    _add_report(commands)
+    _add_ensemble(commands)
+    return parser
+
+
+def _command(
+    commands: Commands,
+    name: str,
+    summary: str,
+    text: str,
+    example: str,
+) -> argparse.ArgumentParser:
+    parser = commands.add_parser(
+        name,
+        help=summary,
+        description=text,
+        epilog=f"example:\n  {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(command=name)
+    return parser
+
+
+def _add_new(commands: Commands) -> None:
+    _command(
+        commands,
+        "new",
+        "print a commented starter design",
+        "Prints a design file with every setting explained: a plain weave ready to run.",
+        "circuittex new > weave.toml",
+    )
+
+
+def _add_run(commands: Commands) -> None:
+    parser = _command(
+        commands,
+        "run",
+        "compute a design: relax, stretch, solve, write netlists, check, fit, report",
+        "Relaxes the woven cell of DESIGN, follows its loading paths, and for every recorded state solves\n"
+        "voltage and temperature for each probe, writes the netlists, has ngspice confirm them and fits Ry and\n"
+        "Rc. Leaves in DIR: summary.json, report.html, the netlists, all results in HDF5, figures, and files\n"
+        "for ParaView. States are written one by one: however a run ends, the same command goes on from the\n"
+        "states that are finished, with the same numbers. Loading paths are computed beside one another, as far\n"
+        "as there are cores. Results of another design in DIR are refused, and so is a DIR that another run is\n"
+        "writing to. Exit code 1 where routes differ by more than 1e-9; without ngspice the run completes and\n"
+        "says that it did not check.",
+        "circuittex run examples/plain_weave.toml --out results/plain_weave",
+    )
+    _add_design(parser)
+    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder of the results; made if missing")
+    parser.add_argument(
+        "--fresh",
+        action="store_true",
+        help="start again: remove what earlier runs left in DIR, of this design or another; your own files stay",
+    )
+    parser.add_argument(
+        "--error-estimate",
+        action="store_true",
+        help="estimate the discretisation error of clamp forces, currents, Ry and Rc in the relaxed state and the last "
+        "state of each loading path, from three more relaxations each: on half and on twice as many elements, and with "
+        "twice as many contact points. A run made without gets them when it is repeated with this option",
+    )
+    parser.add_argument(
+        "--branches",
+        action="store_true",
+        help="reach every recorded state once more, with the fibrils in another order, and say whether clamp forces "
+        "and currents stay the same or that order chooses among branches; this takes as long as the relaxations did. A "
+        "run made without gets the checks when it is repeated with this option",
+    )
+    parser.add_argument(
+        "--workers",
+        metavar="N",
+        type=int,
+        help="processes that compute loading paths beside one another, at most one for each path (default: the cores "
+        "there are); the numbers do not depend on it",
+    )
+
+
+def _add_netlist(commands: Commands) -> None:
+    parser = _command(
+        commands,
+        "netlist",
+        "write a netlist of a computed state",
+        "Writes a SPICE netlist of one state of a results folder: the detailed network of fibrils and contacts\n"
+        "as a sub-circuit with one pin per yarn end or as a deck that runs as it stands, or the reduced network\n"
+        "of Ry and Rc. Every netlist begins with a comment header: what it is, design, state, units, pins.",
+        "circuittex netlist results/plain_weave --state relaxed --resolution full --out relaxed.cir",
+    )
+    _add_results(parser)
+    parser.add_argument("--state", metavar="NAME", default="relaxed", help="recorded state (default: relaxed)")
+    parser.add_argument(
+        "--kind",
+        choices=("subckt", "deck", "reduced"),
+        default="subckt",
+        help="sub-circuit (default), runnable deck of one probe, or the reduced network as a sub-circuit",
+    )
+    parser.add_argument("--probe", metavar="NAME", help="probe of '--kind deck' (default: the first of the design)")
+    parser.add_argument(
+        "--resolution",
+        choices=("merged", "full"),
+        default="merged",
+        help="merged: contact points within the design's merge length are one, as ngspice checks it (default); "
+        "full: every contact point, which may be more than ngspice can order in reasonable time",
+    )
+    parser.add_argument("--out", metavar="FILE", type=Path, help="file to write (default: standard output)")
+
+
+def _add_verify(commands: Commands) -> None:
+    parser = _command(
+        commands,
+        "verify",
+        "check computed states again: finite elements, nodal solution, ngspice",
+        "Solves every recorded state again by all three routes and prints the largest differences of node\n"
+        "voltages and terminal currents. Exit code 1 where routes differ by more than 1e-9 or ngspice did not\n"
+        "answer. Changes nothing in the folder.",
+        "circuittex verify results/plain_weave --state relaxed",
+    )
+    _add_results(parser)
+    parser.add_argument("--state", metavar="NAME", help="only this state (default: all)")
+
+
+def _add_report(commands: Commands) -> None:
+    parser = _command(
+        commands,
+        "report",
+        "draw figures and report again from the stored results",
+        "Rebuilds figures, report.html and summary.json from the HDF5 file of a results folder. Solves nothing.\n"
+        "A folder that a run is writing to is refused: the run draws the report itself when it is done.",
+        "circuittex report results/plain_weave",
+    )
+    _add_results(parser)
+    parser.add_argument(
+        "--beside",
+        metavar="OTHER",
+        type=Path,
+        help="results of the paper's cell with the other parameter set: they get a column of their own in the table "
+        "that compares the paper's claims with what is found",
+    )
+
+
+def _add_ensemble(commands: Commands) -> None:
+    parser = _command(
+        commands,
+        "ensemble",
+        "compute many random packings of a design, and the spread of its results",
+        "Computes members that differ from DESIGN by small random offsets of the fibrils, twists of the yarns and\n"
+        "shifts of their waves: as the [packing] table of DESIGN says, or moving fibrils by 5 % of their radius.\n"
+        "Leaves in DIR: the median and percentile bands of forces, currents, Ry and Rc against strain as\n"
+        "ensemble.html, ensemble.csv and ensemble.json, and each member's study in members/NUMBER. Needs the\n"
+        "extra 'circuittex[ensemble]'. However it ends, the same command goes on; it may ask for more members.",
+        "circuittex ensemble examples/plain_weave.toml --members 32",
+    )
+    _add_design(parser)
+    parser.add_argument("--members", metavar="N", type=int, required=True, help="how many packings")
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, help="folder of the results (default: results/NAME-ensemble)"
+    )
+    parser.add_argument("--seed", metavar="S", type=int, help="of the ensemble (default: the one in [packing], or 0)")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--workers", metavar="W", type=int, help="processes on this machine (default: its cores)")
+    where.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="a running Dask scheduler, such as tcp://node1:8786; its workers need circuittex and must share DIR",
+    )
+
+
+def _add_design(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("design", metavar="DESIGN", type=Path, help="design file (TOML); see 'circuittex new'")
+    parser.add_argument("--quiet", action="store_true", help="show no progress and no closing table")
+
+
+def _add_results(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("results", metavar="RESULTS", type=Path, help="folder that 'circuittex run' has written")

@@ -1,0 +1,1 @@
+"""From a contact state to voltages, currents and circuits."""

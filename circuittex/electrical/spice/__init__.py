@@ -1,0 +1,1 @@
+"""SPICE words, the reader of netlists, PySpice objects, and ngspice."""

@@ -1,6 +1,0 @@
-"""Ensembles: the same design with many random packings, each a full study, and the spread of their results."""
-
-from circuittex.ensemble.result import Ensemble, percentiles
-from circuittex.ensemble.run import run_ensemble
-
-__all__ = ["Ensemble", "percentiles", "run_ensemble"]

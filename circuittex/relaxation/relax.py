@@ -1,0 +1,108 @@
+"""Relaxation of a whole fabric: beams and contact together, to equilibrium; and its clamps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from circuittex.base.arrays import Floats
+from circuittex.base.frozen import frozen, same
+from circuittex.contact.penalty import PenaltyContact
+from circuittex.design import Design
+from circuittex.geometry.mesh import FibrilMesh
+from circuittex.mech.beam import Beam
+from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.minimise import minimise
+from circuittex.mech.space import BeamSpace, beam_space
+from circuittex.solvers.linear import LinearSolver
+from circuittex.solvers.multifrontal import MultifrontalSolver
+
+
+@frozen
+class Equilibrium:
+    """An equilibrium of the fabric with its clamped ends where the configuration has them."""
+
+    configuration: Configuration
+    reaction: Floats
+    """(N, 3) force of the clamps on each node, N; zero inside and at free ends, up to the residual."""
+    section_force: Floats
+    """(M, 3) section force ∫ P E3 dA in each element, N."""
+    energy: float
+    """Stored elastic and contact energy, N mm."""
+    residual: float
+    """Largest free-dof force, N."""
+    iterations: int
+    """Linear systems solved: Newton iterations, and one for the prediction where there was one."""
+    history: Floats
+    """(Newton iterations + 1, 4) residual N, potential N mm, shift N/(mm g), step length."""
+
+
+def force_terms(mesh: FibrilMesh, design: Design, free: str = "") -> tuple[BeamSpace, Beam, PenaltyContact]:
+    """The space of the fibrils and the two force terms, elasticity and contact, that a design asks for."""
+    numerics = design.numerics
+    space = beam_space(mesh, free)
+    beam = Beam(space, degree=numerics.section_degree)
+    contact = PenaltyContact(mesh, penalty=design.contact.penalty, per_element=numerics.contact_points)
+    return space, beam, contact
+
+
+def relax(
+    mesh: FibrilMesh,
+    design: Design,
+    start: Configuration | None = None,
+    *,
+    before: Configuration | None = None,
+    free: str = "",
+    solver: LinearSolver | None = None,
+    report: Callable[[int, float], None] | None = None,
+) -> Equilibrium:
+    """The equilibrium that descent from `start` (by default the initial weave) reaches, ends held as there.
+
+    Where `start` was moved from the equilibrium `before`, the descent starts from what that predicts. The
+    ends of yarns along `free`, 'x' or 'y', are not held.
+
+    Raises `ConvergenceError` with the history where it is not reached.
+    """
+    space, beam, contact = force_terms(mesh, design, free)
+    start = start if start is not None else initial_configuration(mesh)
+    moved = before is not None and not same(before, start)
+    minimum = minimise(
+        [beam, contact],
+        space.vector(start),
+        mass=beam.mass,
+        fixed=space.fixed,
+        solver=solver if solver is not None else MultifrontalSolver(),
+        before=space.vector(before) if before is not None and moved else None,
+        tolerance=design.numerics.tolerance,
+        max_iterations=design.numerics.max_iterations,
+        report=report,
+    )
+    return Equilibrium(
+        configuration=space.configuration(minimum.q),
+        reaction=space.configuration(minimum.gradient).r,
+        section_force=beam.section_force(minimum.q),
+        energy=minimum.energy,
+        residual=minimum.residual,
+        iterations=minimum.iterations,
+        history=minimum.history,
+    )
+
+
+def move(configuration: Configuration, before: Floats, after: Floats) -> Configuration:
+    """The whole body moved in its plane from the average deformation gradient `before` to `after` (2, 2).
+
+    Positions follow the affine increment; directors keep their place and find theirs in the relaxation.
+    """
+    x = configuration.x.copy()
+    x[:, 0, :2] = x[:, 0, :2] @ (after @ np.linalg.inv(before)).T
+    return Configuration(x)
+
+
+def clamp_force(mesh: FibrilMesh, reaction: Floats) -> Floats:
+    """(2, 3) total force of the clamps on the plus ends of the yarns along x and along y, N [40, 41].
+
+    Positive along the yarns where the clamps pull.
+    """
+    ends, axis = mesh.end_nodes(+1), mesh.yarn_axis[mesh.yarn]
+    return np.stack([reaction[ends[axis == k]].sum(axis=0) for k in (0, 1)])

@@ -1,0 +1,177 @@
+"""Frozen dataclasses as a tree of HDF5 groups, without pickles: equal parts are stored once and shared.
+
+A dataclass becomes a group whose datasets and attributes bear the names of its fields, so that any HDF5 viewer
+shows what it holds. Every array, tuple and dataclass is also linked under ``/objects`` by the digest of its content;
+what is there already is linked, not written again. A link costs a few bytes: the fibril mesh that every contact state
+refers to, or the coordinates that three probes have in common, are in the file once, and once in memory after loading.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any, get_args, get_type_hints
+
+import h5py
+import numpy as np
+
+from circuittex.base.errors import StoreError
+
+TYPE = "@type"
+"""Attribute with the kind of an HDF5 object; no field can have this name."""
+
+_SCALARS = (bool, int, float, str)
+_COMPRESS_ABOVE = 256  # elements; below, chunking costs more than compression saves
+
+
+def registry(root: type) -> dict[str, type]:
+    """The dataclasses that occur in the annotations of `root`, by name: what a file may ask to be built.
+
+    >>> from circuittex.mech.configuration import Configuration
+    >>> registry(Configuration)
+    {'Configuration': <class 'circuittex.mech.configuration.Configuration'>}
+    """
+    found: dict[str, type] = {}
+    pending: list[Any] = [root]
+    while pending:
+        kind = pending.pop()
+        pending.extend(get_args(kind))
+        if isinstance(kind, type) and is_dataclass(kind) and found.get(kind.__name__) is not kind:
+            if kind.__name__ in found:
+                raise TypeError(f"two result types are called {kind.__name__}")
+            found[kind.__name__] = kind
+            pending.extend(get_type_hints(kind).values())
+    return found
+
+
+class Digests:
+    """Content digests; remembers the objects it has seen, which must stay alive and unchanged meanwhile."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, tuple[object, str]] = {}
+
+    def __call__(self, value: object) -> str:
+        """Digest of arrays, scalars, tuples and dataclasses; equal exactly for equal types and equal bits.
+
+        >>> digest = Digests()
+        >>> digest((1.0, "a")) == digest((1.0, "a")), digest(1) == digest(1.0), digest(0.0) == digest(-0.0)
+        (True, False, False)
+        """
+        if id(value) in self._known:
+            return self._known[id(value)][1]
+        result = hashlib.blake2b(digest_size=16)
+        if isinstance(value, (np.ndarray, np.generic)):
+            result.update(f"{type(value).__name__}{value.dtype.str}{value.shape}".encode())
+            result.update(np.ascontiguousarray(value).data)
+        elif isinstance(value, tuple):
+            result.update(f"tuple{len(value)}".encode())
+            result.update("".join(map(self, value)).encode())
+        elif is_dataclass(value) and not isinstance(value, type):
+            result.update(type(value).__name__.encode())
+            for field in fields(value):
+                result.update(f"{field.name}={self(getattr(value, field.name))}".encode())
+        elif value is None or type(value) in _SCALARS:
+            text = value.hex() if isinstance(value, float) else repr(value)
+            result.update(f"{type(value).__name__}{text}".encode())
+        else:
+            raise StoreError(f"cannot store a {type(value).__name__}")
+        self._known[id(value)] = (value, result.hexdigest())
+        return result.hexdigest()
+
+
+class Writer:
+    """Writes objects into an open HDF5 file."""
+
+    def __init__(self, file: h5py.File) -> None:
+        self._shared = file.require_group("objects")
+        self.digest = Digests()
+
+    def put(self, parent: h5py.Group, name: str, value: object) -> None:
+        """Write `value` into `parent`: scalars as attributes, everything else as linked objects."""
+        if value is None:
+            parent.attrs[name] = h5py.Empty("f8")
+        elif type(value) in _SCALARS:
+            parent.attrs[name] = _scalar(value)
+        else:
+            key = self.digest(value)
+            if key not in self._shared:
+                self._create(key, value)
+            parent[name] = self._shared[key]
+
+    def _create(self, key: str, value: object) -> None:
+        if isinstance(value, (np.ndarray, np.generic)):
+            if value.dtype.kind not in "biufc":
+                raise StoreError(f"cannot store an array of {value.dtype}")
+            packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "chunks": value.shape}
+            stored = self._shared.create_dataset(key, data=value, **(packed if value.size > _COMPRESS_ABOVE else {}))
+            stored.attrs[TYPE] = "array" if isinstance(value, np.ndarray) else "scalar"
+        elif isinstance(value, tuple) and value and type(value[0]) in _SCALARS and len(set(map(type, value))) == 1:
+            data = [_scalar(item) for item in value]
+            stored = self._shared.create_dataset(key, data=data, dtype=_dtype(type(value[0])))
+            stored.attrs[TYPE] = "tuple"
+        elif isinstance(value, tuple):
+            group = self._shared.create_group(key)
+            group.attrs[TYPE] = "tuple"
+            group.attrs["@length"] = len(value)
+            for number, item in enumerate(value):
+                self.put(group, f"{number:04d}", item)
+        else:
+            group = self._shared.create_group(key)
+            group.attrs[TYPE] = type(value).__name__
+            for field in fields(value):  # type: ignore[arg-type]
+                self.put(group, field.name, getattr(value, field.name))
+
+
+class Reader:
+    """Rebuilds objects from an open HDF5 file; what is one object in the file becomes one object in memory."""
+
+    def __init__(self, types: Mapping[str, type]) -> None:
+        self._types = types
+        self._built: dict[int, Any] = {}
+
+    def get(self, parent: h5py.Group, name: str) -> Any:
+        """The value that `Writer.put` stored under `name`."""
+        if name in parent.attrs:
+            value = parent.attrs[name]
+            return None if isinstance(value, h5py.Empty) else value if isinstance(value, str) else value.item()
+        stored = parent[name]
+        address = h5py.h5o.get_info(stored.id).addr
+        if address not in self._built:
+            self._built[address] = self._build(stored)
+        return self._built[address]
+
+    def _build(self, stored: h5py.Dataset | h5py.Group) -> Any:
+        kind = stored.attrs[TYPE]
+        if isinstance(stored, h5py.Dataset):
+            if kind == "tuple":
+                text = h5py.check_string_dtype(stored.dtype) is not None
+                return tuple((stored.asstr()[()] if text else stored[()]).tolist())
+            value = stored[()]
+            if kind == "array":
+                value = np.asarray(value)
+                value.setflags(write=False)
+            return value
+        if kind == "tuple":
+            return tuple(self.get(stored, f"{number:04d}") for number in range(int(stored.attrs["@length"])))
+        if kind not in self._types:
+            raise StoreError(f"unknown type {kind!r}")
+        names = {field.name for field in fields(self._types[kind])}
+        if names != (set(stored) | set(stored.attrs)) - {TYPE}:
+            raise StoreError(f"the fields of {kind} are not those of this version of circuittex")
+        return self._types[kind](**{name: self.get(stored, name) for name in names})
+
+
+def _scalar(value: Any) -> Any:
+    if isinstance(value, str):
+        if "\0" in value or any("\ud800" <= letter <= "\udfff" for letter in value):
+            raise StoreError(f"cannot store the text {value!r}: NUL and lone surrogates are not allowed")
+        return value
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        raise StoreError(f"cannot store the integer {value}: at most 64 bits are allowed")
+    return _dtype(type(value)).type(value)
+
+
+def _dtype(kind: type) -> np.dtype[Any]:
+    text: np.dtype[Any] = h5py.string_dtype()
+    return text if kind is str else np.dtype({bool: np.bool_, int: np.int64, float: np.float64}[kind])

@@ -1,0 +1,1 @@
+"""The fibrils as tubes, for ParaView."""

@@ -1,0 +1,216 @@
+"""The fronts of a sparse matrix: in what order its unknowns are eliminated, and which of them together.
+
+The multifrontal method (Duff & Reid, ACM TOMS 9, 1983; Liu, SIAM Review 34, 1992) makes some hundred dense matrices
+of one sparse matrix. A *front* is a dense symmetric matrix of m unknowns. The first p of them, its *pivots*, are
+eliminated there; what that adds to the others, its *border*, goes to the front *above*, the one that has the
+border's first unknown among its pivots.
+
+Ordering and elimination are followed in *parts* of nodes, the unknowns of which have the same neighbours: part 2 a is
+the position of node a, part 2 a + 1 its directors.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from circuittex.base.arrays import Floats, Ints
+from circuittex.base.compiled import compiled
+from circuittex.base.frozen import frozen
+from circuittex.solvers.dissection import dissect
+from circuittex.solvers.elimination_tree import EliminationTree, elimination_tree, subtrees, work
+from circuittex.solvers.pattern import DOFS, Pattern, ranges
+
+POSITION = 3
+"""Unknowns of a node's position; the others are its directors'."""
+WORTHWHILE = 1.2
+"""Parts are dissected anew where their last order takes this times the operations that it took when it was made, since
+pairs have come to be coupled across its separators."""
+
+
+@frozen
+class Front:
+    """The place of a front in the factor and in the front above; unknowns are numbered in the order of elimination."""
+
+    first: int
+    """its first pivot; the others follow."""
+    pivots: int
+    """p."""
+    border: Ints
+    """(b,) the unknowns of its border, rising."""
+    start: int
+    """where in the factor its values begin: (p, p) of the pivots, then (p, b) of the border, row after row."""
+    above: int
+    """number of the front above; -1 where there is no border."""
+    below: tuple[int, ...]
+    """numbers of the fronts right below, rising."""
+    places: Ints
+    """(b,) where those of the border are in the front above, its pivots first."""
+    runs: Ints
+    """where in `places` runs of successive ones begin, none of them of pivots and others; and, last, b."""
+
+
+@frozen
+class Analysis:
+    """What a factorisation needs to know besides the values."""
+
+    order: Ints
+    """(n_dofs,) unknowns in the order of elimination."""
+    fronts: tuple[Front, ...]
+    """in the order of elimination: each comes after those below it."""
+    target: Ints
+    """where in the factor each of the entries belongs."""
+    size: int
+    """values in the factor."""
+    parts: Ints
+    """the parts by their turns, as dissection gave them."""
+    least: float
+    """floating-point operations that a factorisation took when the parts were dissected."""
+    subtrees: tuple[range, ...]
+    """fronts to eliminate one after another, side by side with those of other ranges; the last is above all others."""
+
+
+def analyse(pattern: Pattern, coupled: NDArray[np.bool_], entries: Ints, last: Analysis | None = None) -> Analysis:
+    """The order of elimination and the fronts of a matrix in which some node pairs are coupled, the others not.
+
+    `coupled` tells of each pair of the pattern whether it counts, `entries` are the places of the entries that do
+    (`circuittex.solvers.coupled`). Parts take turns as in the `last` analysis, if there is one, while that serves; else
+    they are dissected anew.
+    """
+    graph = _graph(pattern, coupled)
+    width = np.tile([POSITION, DOFS - POSITION], graph.shape[0] // 2)
+    tree, least = _ordered(graph, width, pattern.position, last)
+    parts, begin, later, tops, front_of_turn = tree.parts, tree.begin, tree.later, tree.tops, tree.front
+
+    # Parts by their fronts, then their unknowns: the order of elimination.
+    by_front = np.argsort(front_of_turn, kind="stable")
+    parts, turn = parts[by_front], np.argsort(by_front)
+    width = width[parts]
+    order = ranges(DOFS * (parts // 2) + POSITION * (parts % 2), width)
+    place, front_of = np.argsort(order), np.repeat(front_of_turn[by_front], width)
+    p = np.bincount(front_of)
+    first = np.cumsum(p) - p
+
+    # Borders, one after another in the order of the fronts.
+    owner = np.repeat(np.arange(len(tops)), begin[tops + 1] - begin[tops])
+    bordering = turn[later[ranges(begin[tops], begin[tops + 1] - begin[tops])]]
+    sort = np.lexsort((bordering, owner))
+    owner, bordering = owner[sort], bordering[sort]
+    border = ranges((np.cumsum(width) - width)[bordering], width[bordering])
+    owner = np.repeat(owner, width[bordering])
+    b = np.bincount(owner, minlength=len(p))
+    cut = np.concatenate([[0], np.cumsum(b)])
+    above = np.full(len(p), -1)
+    above[b > 0] = front_of[border[cut[:-1][b > 0]]]
+    places = np.empty(len(border), dtype=np.int64)
+    _find(above[owner], border, first, p, cut, border, places)
+    breaks = (np.diff(places, prepend=-2) != 1) | (places == p[above[owner]])
+    breaks[cut[:-1][b > 0]] = True
+    runs = np.flatnonzero(breaks)
+    run_cut = np.searchsorted(runs, cut)
+    below: list[list[int]] = [[] for _ in p]
+    for k in np.flatnonzero(above >= 0).tolist():
+        below[above[k]].append(k)
+    size = p * (p + b)
+    start = np.cumsum(size) - size
+    fronts = tuple(
+        Front(
+            first=int(first[k]),
+            pivots=int(p[k]),
+            border=border[cut[k] : cut[k + 1]],
+            start=int(start[k]),
+            above=int(above[k]),
+            below=tuple(below[k]),
+            places=places[cut[k] : cut[k + 1]],
+            runs=np.append(runs[run_cut[k] : run_cut[k + 1]], cut[k + 1]) - cut[k],
+        )
+        for k in range(len(p))
+    )
+    target = np.empty(len(entries), dtype=np.int64)
+    _locate(entries, pattern.indptr, pattern.indices, place, front_of, first, p, cut, border, start, target)
+    return Analysis(
+        order=order,
+        fronts=fronts,
+        target=target,
+        size=int(size.sum()),
+        parts=tree.parts,
+        least=least,
+        subtrees=subtrees(above, work(p.astype(float), b.astype(float))),
+    )
+
+
+def _ordered(
+    graph: sp.csr_array, width: Ints, position: Floats, last: Analysis | None
+) -> tuple[EliminationTree, float]:
+    """The elimination tree in the last order or else a new one, and the operations when that order was made."""
+    if last is not None and len(last.parts) == len(width):
+        tree = elimination_tree(graph, width, last.parts)
+        if tree.operations <= WORTHWHILE * last.least:
+            return tree, last.least
+    tree = elimination_tree(graph, width, dissect(graph, width, position.repeat(2, axis=0)))
+    return tree, tree.operations
+
+
+@compiled
+def _find(front: Any, unknown: Any, first: Any, pivots: Any, cut: Any, border: Any, found: Any) -> None:
+    """Fill found with where unknowns are in fronts: among the pivots, or in the border behind them."""
+    for k in range(front.shape[0]):
+        f = front[k]
+        found[k] = unknown[k] - first[f]
+        if found[k] >= pivots[f]:
+            found[k] = pivots[f] + np.searchsorted(border[cut[f] : cut[f + 1]], unknown[k])
+
+
+@compiled
+def _locate(
+    entries: Any,
+    indptr: Any,
+    indices: Any,
+    place: Any,
+    front_of: Any,
+    first: Any,
+    pivots: Any,
+    cut: Any,
+    border: Any,
+    start: Any,
+    target: Any,
+) -> None:
+    """Fill target with where the entries of the matrix belong in the factor.
+
+    What comes next in a row is mostly the next unknown in the same front, or of the same unknown.
+    """
+    row, f, column, at = 0, -1, -1, -1
+    for k in range(entries.shape[0]):
+        while entries[k] >= indptr[row + 1]:
+            row += 1
+        i, j = place[row], place[indices[entries[k]]]
+        i, j = min(i, j), max(i, j)
+        if front_of[i] != f or j != column:
+            next_one = front_of[i] == f and j == column + 1 and at + 1 >= pivots[f]
+            f, column = front_of[i], j
+            own = cut[f] - pivots[f]  # where in `border` the first pivot would be
+            if j - first[f] < pivots[f]:
+                at = j - first[f]
+            elif next_one and own + at + 1 < cut[f + 1] and border[own + at + 1] == j:
+                at += 1
+            else:
+                at = pivots[f] + np.searchsorted(border[cut[f] : cut[f + 1]], j)
+        p, r = pivots[f], i - first[f]
+        wide = cut[f + 1] - cut[f]
+        target[k] = start[f] + (r * p + at if at < p else p * p + r * wide + at - p)
+
+
+def _graph(pattern: Pattern, coupled: NDArray[np.bool_]) -> sp.csr_array:
+    """Ones where two different parts are coupled."""
+    n = pattern.n_dofs // DOFS
+    node = np.arange(n)
+    a, b = np.repeat(node, np.diff(pattern.neighbour_start))[coupled], pattern.neighbour[coupled]
+    full = pattern.full_offset[coupled] >= 0
+    c, d = a[full], b[full]
+    i = np.concatenate([2 * node, 2 * a, 2 * c, 2 * c + 1, 2 * c + 1])
+    j = np.concatenate([2 * node + 1, 2 * b, 2 * d + 1, 2 * d, 2 * d + 1])
+    ends = np.concatenate([i, j]), np.concatenate([j, i])
+    return sp.csr_array((np.ones(2 * len(i)), ends), shape=(2 * n, 2 * n))

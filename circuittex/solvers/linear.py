@@ -1,0 +1,25 @@
+"""What the equilibrium iteration asks of a direct solver: solutions, and "is the tangent positive definite?".
+
+A solver's `factor` takes the pattern and the values of a symmetric matrix and returns a function that
+solves with it, or None where a pivot is not positive. The symbolic analysis is kept while the same `Pattern` object
+comes back and its values couple no node pair that was not coupled before (`circuittex.solvers.coupled`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from circuittex.base.arrays import Floats
+from circuittex.solvers.pattern import Pattern
+
+Solve = Callable[[Floats], Floats]
+
+
+class LinearSolver(Protocol):
+    """A direct solver: `circuittex.solvers.multifrontal` is the one by default."""
+
+    name: str
+
+    def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
+        """A function that solves with the matrix, or None if it is not positive definite."""

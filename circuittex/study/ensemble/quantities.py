@@ -1,0 +1,48 @@
+"""What an ensemble measures in every state: clamp forces, probe currents, Ry and Rc."""
+
+from __future__ import annotations
+
+from circuittex.base.frozen import frozen
+from circuittex.design import Design
+from circuittex.results.records import Record
+
+SIDES = ("warp", "weft")
+
+
+@frozen
+class Quantity:
+    """One number of a state.
+
+    >>> Quantity("Ry", "ohm").column
+    'Ry_ohm'
+    """
+
+    name: str
+    """For example 'warp_Fx', 'current_straight', 'Ry'."""
+    unit: str
+
+    @property
+    def column(self) -> str:
+        """Name and unit as one word."""
+        return f"{self.name}_{self.unit}"
+
+
+def quantities(design: Design) -> tuple[Quantity, ...]:
+    """Everything that is measured in a state of `design`, in order.
+
+    Forces are those of the clamps on the +x ends of the warp and the +y ends of the weft [40, 41].
+
+    >>> from circuittex.design import plain_weave
+    >>> [quantity.name for quantity in quantities(plain_weave(yarns=1))][5:]
+    ['weft_Fz', 'current_straight', 'current_perpendicular', 'Ry', 'Rc']
+    """
+    forces = [Quantity(f"{side}_F{axis}", "N") for side in SIDES for axis in "xyz"]
+    currents = [Quantity(f"current_{probe.name}", "A") for probe in design.probes]
+    network = [Quantity("Ry", "ohm"), Quantity("Rc", "ohm")] if design.probes else []
+    return (*forces, *currents, *network)
+
+
+def measure(record: Record) -> list[float]:
+    """The values of a recorded state, in the order of `quantities`."""
+    network = [record.fit.Ry, record.fit.Rc] if record.fields else []
+    return [*map(float, record.clamp_force.ravel()), *record.currents, *map(float, network)]

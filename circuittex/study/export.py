@@ -1,0 +1,126 @@
+"""The netlists of one recorded state: detailed sub-circuit, probe decks, reduced network."""
+
+from __future__ import annotations
+
+import re
+from functools import partial
+from pathlib import Path
+
+from circuittex.base.atomic import write_text
+from circuittex.contact.merge import Simplified, simplify
+from circuittex.contact.state import ContactState
+from circuittex.design import Design, Probe, design_hash
+from circuittex.electrical.network.circuit import Circuit, build_circuit, reduced_circuit, yarn_end_terminals
+from circuittex.fit import Fit
+from circuittex.netlist import Header, deck, subcircuit
+
+JOINED = "every yarn end is one pin that joins its fibrils; the probe decks join those of their two terminals only"
+
+
+def simplified(design: Design, contacts: ContactState, *, merge_length: float | None = None) -> Simplified:
+    """The contacts as a design wants them in netlists; `merge_length` (mm) in place of the design's, 0 keeps all."""
+    numerics = design.numerics
+    return simplify(
+        contacts,
+        merge_length=numerics.merge_length if merge_length is None else merge_length,
+        snap_length=numerics.snap_length,
+        drop_fraction=numerics.drop_fraction,
+    )
+
+
+def detailed_circuit(simple: Simplified) -> Circuit:
+    """Fibril segments and contacts, with one port for each yarn end."""
+    terminals = yarn_end_terminals(simple.contacts.mesh)
+    return build_circuit(simple.contacts, terminals, dropped_contacts=simple.dropped_contacts)
+
+
+def detailed_netlist(design: Design, state: str, simple: Simplified, *, merge_length: float | None = None) -> str:
+    """The `.subckt` of `detailed_circuit`; `merge_length` as it was given to `simplified`, for the header."""
+    notes = (JOINED, *_simplification(design, simple, merge_length))
+    header = _header(design, state)("detailed resistor network of fibril segments and contacts", notes=notes)
+    return subcircuit(detailed_circuit(simple), f"{state_word(state)} {design.name}", header)
+
+
+def probe_netlist(
+    design: Design, state: str, simple: Simplified, probe: Probe, *, merge_length: float | None = None
+) -> str:
+    """A runnable deck of the detailed network as one probe sees it: all other fibril ends insulated one by one.
+
+    `merge_length` as it was given to `simplified`, for the header.
+    """
+    terminals = [terminal for terminal in design.terminals if terminal.name in (probe.source, probe.sink)]
+    circuit = build_circuit(simple.contacts, terminals, dropped_contacts=simple.dropped_contacts)
+    notes = _simplification(design, simple, merge_length)
+    header = _header(design, state)(f"detailed resistor network, probe {probe.name}", notes=notes)
+    return deck(circuit, {probe.source: probe.voltage, probe.sink: 0.0}, header)
+
+
+def reduced_netlist(design: Design, state: str, fit: Fit) -> str:
+    """The `.subckt` of the reduced network [43-46], one pin for each yarn end."""
+    circuit = reduced_circuit((len(design.weave.warp), len(design.weave.weft)), fit.Ry, fit.Rc)
+    notes = (f"Ry = {fit.Ry!r} ohm a yarn segment, Rc = {fit.Rc!r} ohm a crossing", *fit.warnings)
+    header = _header(design, state)("reduced network of yarn segments and crossings", notes=notes)
+    return subcircuit(circuit, f"{state_word(state)} reduced {design.name}", header)
+
+
+def state_word(state: str) -> str:
+    """The state as it begins the names of its sub-circuits, where a long title of the design cannot cut it off.
+
+    SPICE ignores case and signs are no letters, so that a minus before a number is spelt out.
+
+    >>> state_word("stretch-0.05"), state_word("stretch--0.05")
+    ('stretch_0_05', 'stretch_minus_0_05')
+    """
+    return re.sub("[^a-z0-9]+", "_", state.lower().replace("--", "-minus-"))
+
+
+def detailed_file(state: str) -> str:
+    """Name of the file of a state's detailed sub-circuit."""
+    return f"{state}.sub"
+
+
+def netlist_files(design: Design, state: str, fit: Fit | None) -> tuple[str, ...]:
+    """Names of the files of all netlists of a state: the detailed one, a deck for each probe, the reduced one."""
+    decks = (f"{state}_{probe.name}.cir" for probe in design.probes)
+    reduced = (f"{state}_reduced.sub",) if fit is not None and 0 < fit.Ry < float("inf") else ()
+    return (detailed_file(state), *decks, *reduced)
+
+
+def write_netlists(folder: Path, design: Design, state: str, simple: Simplified, fit: Fit | None) -> Path:
+    """Write all netlists of a state into `folder`; returns the path of the detailed sub-circuit."""
+    folder.mkdir(parents=True, exist_ok=True)
+    texts = [detailed_netlist(design, state, simple)]
+    texts += [probe_netlist(design, state, simple, probe) for probe in design.probes]
+    files = netlist_files(design, state, fit)
+    if fit is not None and len(files) > len(texts):
+        texts.append(reduced_netlist(design, state, fit))
+    for name, text in zip(files, texts, strict=True):
+        write_text(folder / name, text, encoding="ascii")
+    return folder / files[0]
+
+
+def _header(design: Design, state: str) -> partial[Header]:
+    return partial(Header, design=design.name, design_hash=design_hash(design), state=state)
+
+
+def _simplification(design: Design, simple: Simplified, merge_length: float | None) -> tuple[str, ...]:
+    """What was done to the contacts, and how often."""
+    numerics = design.numerics
+    length = numerics.merge_length if merge_length is None else merge_length
+    merged = (
+        f"contact points of two fibrils in the same bin of {length!r} mm are one: {simple.merged_contacts} were added "
+        "to another"
+        if length
+        else "contact points are not merged"
+    )
+    snapped = (
+        f"feet on a fibril closer than {numerics.snap_length!r} mm share a node: {simple.merged_feet} were moved onto "
+        "another"
+        if numerics.snap_length
+        else "feet are not snapped"
+    )
+    dropped = (
+        f"contacts below {numerics.drop_fraction!r} of the largest conductance are left out: "
+        f"{simple.dropped_contacts} were"
+    )
+    return merged, snapped, dropped

@@ -1,0 +1,176 @@
+"""Algorithm 1: relax, then move and relax along every loading path, and record each state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from circuittex.base.compiled import available_cores
+from circuittex.base.errors import DesignError, StoreError
+from circuittex.base.lock import locked
+from circuittex.base.version import __version__
+from circuittex.base.workers import Here, Job, Pool, completed
+from circuittex.design import Design, design_hash
+from circuittex.geometry.weave import build_mesh
+from circuittex.mech.configuration import initial_configuration
+from circuittex.results.records import Finding, Record, Study, with_finding
+from circuittex.solvers.linear import LinearSolver
+from circuittex.solvers.multifrontal import MultifrontalSolver
+from circuittex.study.branch_check import branch_checks
+from circuittex.study.error_estimate import estimates, variants
+from circuittex.study.folder import (
+    complete,
+    keep_finding,
+    keep_record,
+    needs_report,
+    open_study,
+    write_numbers,
+    write_state,
+)
+from circuittex.study.plan import RELAXED, plan
+from circuittex.study.record import reach
+from circuittex.study.schedule import compute
+
+Say = Callable[[str], None]
+Keep = Callable[[Study, Record], Study]
+
+
+def run_study(
+    design: Design,
+    out: str | Path | None = None,
+    *,
+    fresh: bool = False,
+    error_estimate: bool = False,
+    branches: bool = False,
+    workers: int | None = None,
+    solver: Callable[[], LinearSolver] = MultifrontalSolver,
+    progress: Say | None = None,
+) -> Study:
+    """Compute a design: the relaxed state and every state of its loading paths.
+
+    With `out`, everything is left in that folder, which no other run can use meanwhile. The HDF5 file there grows state
+    by state, netlists and VTU files are written with each, figures and report at the end. However a run ends, the same
+    call goes on from the states that are there, with the same numbers bit for bit; files that are missing are written
+    again. Results of another design or version are refused unless `fresh` has them removed; files that are not of
+    circuittex are left alone.
+
+    Loading paths are computed beside one another by `workers` processes, by default one for each path as far as there
+    are cores; with one, in this process. The results do not depend on it. `solver` makes the linear solver of each
+    relaxation. `progress` is told in words what is being done; a line break ends what is worth keeping on the screen.
+
+    With `error_estimate` the relaxed state and the last of each loading path get estimates of their discretisation
+    errors, as far as they have none, each from three more relaxations (`estimate_error`). With `branches` every state
+    is reached once more, with the fibrils in another order, to see whether round-off chooses its branch
+    (`check_branch`), as far as it has not been checked. Both are kept one by one as the states are.
+
+    Raises `ConvergenceError` where equilibria are not found, once the other paths are done; `FolderError` where the
+    folder cannot be used; `StoreError` where it cannot be written, on a full disk for example.
+    """
+    say = progress if progress is not None else _say_nothing
+    count = _workers(workers)
+    if error_estimate:
+        variants(design)  # refuses what it must before any long work
+    mesh = build_mesh(design)
+    study = Study(
+        version=__version__,
+        design=design,
+        design_hash=design_hash(design),
+        mesh=mesh,
+        initial=initial_configuration(mesh),
+        records=(),
+    )
+
+    def jobs(found: Study) -> Sequence[Job]:
+        estimated = estimates(found, solver) if error_estimate else []
+        return [*estimated, *(branch_checks(found, solver) if branches else [])]
+
+    if out is None:
+        study = _compute(study, count, solver, say, _with)
+        return _examine(study, jobs(study), count, say, with_finding)
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    with locked(folder):
+        study = open_study(folder, study, fresh=fresh)
+        return _in_folder(folder, study, count, solver, say, jobs)
+
+
+def _in_folder(
+    folder: Path,
+    study: Study,
+    workers: int,
+    solver: Callable[[], LinearSolver],
+    say: Say,
+    jobs: Callable[[Study], Sequence[Job]],
+) -> Study:
+    """Complete the study and everything in its folder."""
+    total, kept = len(plan(study.design)), len(study.records)
+    if kept:
+        say(f"{kept} of {total} states are there already\n")
+
+    def keep(so_far: Study, record: Record) -> Study:
+        nonlocal kept
+        so_far = keep_record(folder, so_far, record)
+        kept += 1
+        write_state(folder, so_far, record)
+        write_numbers(folder, so_far)
+        return so_far
+
+    try:
+        study = _compute(study, workers, solver, say, keep)
+        study = _examine(study, jobs(study), workers, say, partial(keep_finding, folder))
+        if needs_report(folder):
+            say("figures and report")
+        complete(folder, study)
+    except (OSError, StoreError) as error:
+        raise StoreError(
+            f"{error}; {kept} of {total} states are kept in {folder}, and the same call goes on from there"
+        ) from error
+    return study
+
+
+def _compute(study: Study, workers: int, solver: Callable[[], LinearSolver], say: Say, keep: Keep) -> Study:
+    """The study with all its states."""
+    known = {record.name for record in study.records}
+    paths = {step.path for step in plan(study.design) if step.path and step.name not in known}
+    workers = min(workers, len(paths))  # more would wait for one another
+    if workers <= 1:
+        return compute(study, Here(say), solver, keep)
+    pool = Pool(workers, threads=max(1, available_cores() // workers), say=say)
+    try:
+        first = {}
+        if not study.records:  # nothing else can be done yet: this process has all cores for it
+            first = {RELAXED: reach(study, plan(study.design)[0], study.initial, solver, say)}
+        return compute(study, pool, solver, keep, first)
+    finally:
+        pool.close()
+
+
+def _examine(
+    study: Study, jobs: Sequence[Job], workers: int, say: Say, keep: Callable[[Study, Finding], Study]
+) -> Study:
+    """The study with what the jobs find about its states."""
+    workers = min(workers, len(jobs))
+    pool = Pool(workers, threads=max(1, available_cores() // workers), say=say) if workers > 1 else Here(say)
+    with closing(pool) as computers:
+        for finding in completed(computers, jobs):
+            study = keep(study, finding)
+    return study
+
+
+def _workers(asked: int | None) -> int:
+    """The number of processes to use at most."""
+    if asked is not None and (not isinstance(asked, int) or asked < 1):
+        raise DesignError("workers", asked, "it must be a whole number of at least 1")
+    return available_cores() if asked is None else asked
+
+
+def _with(study: Study, record: Record) -> Study:
+    """The study with one more record."""
+    return replace(study, records=(*study.records, record))
+
+
+def _say_nothing(_: str) -> None:
+    pass

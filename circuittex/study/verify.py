@@ -1,0 +1,283 @@
+"""Three independent routes to every probe current and node voltage, and how far they lie apart."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import ParamSpec, TypeVar
+
+import numpy as np
+
+from circuittex.base.arrays import Floats
+from circuittex.base.errors import NgspiceError
+from circuittex.base.frozen import frozen
+from circuittex.contact.state import ContactState
+from circuittex.design import Probe, Terminal
+from circuittex.electrical.fields import Fields, Potential, solve_potentials
+from circuittex.electrical.network.circuit import Circuit, build_circuits
+from circuittex.electrical.network.nodal import rounding_errors, solve_nodal
+from circuittex.electrical.spice.ngspice import run_decks
+from circuittex.geometry.refine import refined
+from circuittex.netlist import deck, pin_names
+
+AGREEMENT = 1e-9
+"""Routes on the same discretisation that differ by more than this (relative current, V per V) do not agree."""
+
+NO_CURRENT = 1e-6
+"""A probe with less than this fraction of the largest probe current is measured against the largest."""
+
+NOTHING = 1e-12
+"""A probe with less than this fraction of an insulated yarn's current carries none: it is measured against that."""
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+@frozen
+class Verification:
+    """Largest differences between the routes over all probes of one contact state."""
+
+    routes: tuple[str, ...]
+    """The routes that answered, of 'fields', 'nodal', 'ngspice'."""
+    max_voltage_difference: float
+    """Largest difference of two routes in one node voltage, V per volt of the probe."""
+    max_current_difference: float
+    """Largest difference of two routes in one terminal current, relative to the current of that probe."""
+    native_difference: float
+    """Largest difference between finite elements and nodal analysis alone, in voltage (V per V) or relative current."""
+    ngspice_limit: float
+    """Difference that ngspice's rounding explains, in voltage (V per V) or relative current; 0 where it did not
+    check."""
+    merge_error: float
+    """Largest relative change of a probe current by the simplification of the contacts."""
+    field_difference: float
+    """Largest relative difference of a probe current between the mechanical mesh and the circuit, both at full
+    resolution: the discretisation error of the former."""
+    fields_seconds: float
+    """Time spent in finite elements, s."""
+    nodal_seconds: float
+    """Time spent in nodal solutions, s."""
+    ngspice_seconds: float
+    """Time spent in ngspice, s; nan where it did not check."""
+    ngspice_checked: bool
+    """Whether ngspice answered every probe and its answers were compared."""
+    note: str
+    """What a reader must know, such as why ngspice did not check or that routes disagree; empty if all is well."""
+
+    @property
+    def agrees(self) -> bool:
+        """Whether all routes agree: to `AGREEMENT`, and ngspice to its rounding where that is coarser."""
+        loosest = max(AGREEMENT, self.ngspice_limit)
+        differences = self.max_voltage_difference, self.max_current_difference
+        return self.native_difference <= AGREEMENT and all(difference <= loosest for difference in differences)
+
+
+@frozen
+class _Answer:
+    """What one route says about one probe."""
+
+    voltage: Floats
+    """(K,) at the nodes of the circuit, V per volt of the probe."""
+    current: float
+    """Into the textile at the source, A."""
+
+
+def verify(
+    contacts: ContactState,
+    simplified: ContactState,
+    terminals: Sequence[Terminal],
+    probes: Sequence[Probe],
+    *,
+    fields: Sequence[Fields] | None = None,
+    timeout: float = 60.0,
+) -> Verification:
+    """Compare finite elements, nodal analysis and ngspice for each probe.
+
+    All three solve the `simplified` contacts, each from them alone; finite elements and nodal analysis also
+    solve all `contacts`, and the differences are the largest of either. Every probe has a circuit of its own,
+    since it joins only its own two terminals. ngspice answers all of them in one process within `timeout`
+    seconds; where it does not, `ngspice_checked` is False and `note` says why. Its double precision is not refined,
+    so that the circuit limits what it can confirm (`ngspice_limit`, see `rounding_errors`); the limit never loosens
+    the comparison of the other two. `fields` are the finite element solutions on all `contacts` with the mesh
+    "feet", for whoever has them already.
+    """
+    if not probes:
+        nan = float("nan")
+        return Verification((), nan, nan, nan, 0.0, nan, nan, 0.0, 0.0, nan, False, "there are no probes to verify")
+    clock = _Clock()
+    coarse = clock("fields", solve_potentials, contacts, terminals, probes, mesh="mechanical")
+    full = clock("fields", solve_potentials, contacts, terminals, probes) if fields is None else fields
+    _, full_fields, full_nodal = _native(clock, contacts, terminals, probes, full)
+    merged = clock("fields", solve_potentials, simplified, terminals, probes)
+    circuits, *answers = _native(clock, simplified, terminals, probes, merged)
+    routes = dict(zip(("fields", "nodal"), answers, strict=True))
+    yarn = _yarn_currents(contacts, probes)
+    native = _difference(full_fields, full_nodal, yarn), _difference(answers[0], answers[1], yarn)
+    note, limit, with_ngspice = "", 0.0, []
+    try:
+        routes["ngspice"] = clock("ngspice", _ngspice, circuits, probes, timeout)
+        limit = _ngspice_limit(circuits, probes, routes["nodal"], yarn)
+        with_ngspice = [_difference(answer, routes["ngspice"], yarn) for answer in answers]
+    except NgspiceError as error:
+        note = f"ngspice did not check this state: {error}"
+    voltage, current = np.max([*native, *with_ngspice], axis=0)
+    found = Verification(
+        routes=tuple(routes),
+        max_voltage_difference=float(voltage),
+        max_current_difference=float(current),
+        native_difference=float(np.max(native)),
+        ngspice_limit=limit,
+        merge_error=_relative([a.current for a in routes["fields"]], [a.current for a in full_fields], yarn),
+        field_difference=_relative([f.currents[0] for f in coarse], [a.current for a in full_nodal], yarn),
+        fields_seconds=clock.seconds["fields"],
+        nodal_seconds=clock.seconds["nodal"],
+        ngspice_seconds=clock.seconds["ngspice"] if "ngspice" in routes else float("nan"),
+        ngspice_checked="ngspice" in routes,
+        note=note,
+    )
+    return replace(found, note=_note(found))
+
+
+def _note(found: Verification) -> str:
+    """The note with what the differences add to it."""
+    sentences = [found.note] if found.note else []
+    if found.ngspice_limit > AGREEMENT:
+        sentences.insert(0, f"ngspice's own rounding limits this check to {found.ngspice_limit:.1e}.")
+    if not found.agrees:
+        differences = (
+            f"{found.max_voltage_difference:.1e} V per V, currents {found.max_current_difference:.1e} relative"
+        )
+        sentences.insert(0, f"the routes disagree: {differences}.")
+    return " ".join(sentences)
+
+
+def field_convergence(
+    contacts: ContactState, terminals: Sequence[Terminal], probes: Sequence[Probe], fields: Sequence[Fields]
+) -> Floats:
+    """How the potential on the mechanical mesh converges to the circuit: (3, 2) node distance mm, current error.
+
+    The nodes of the mechanical mesh, then two and four times as many; the error is the largest relative
+    difference of a probe current from `fields`, the solutions on the mesh "feet", which equal the circuit.
+    """
+    exact, yarn = [f.currents[0] for f in fields], _yarn_currents(contacts, probes)
+    mesh, rows = contacts.mesh, []
+    distance = float((mesh.length / (np.diff(mesh.first_node) - 1)).max())
+    for pieces in (1, 2, 4):
+        finer = replace(
+            contacts, mesh=refined(mesh, pieces), axial_factor=np.repeat(contacts.axial_factor, mesh.order * pieces)
+        )
+        currents = [f.currents[0] for f in solve_potentials(finer, terminals, probes, mesh="mechanical")]
+        rows.append((distance / pieces, _relative(currents, exact, yarn)))
+    return np.array(rows)
+
+
+class _Clock:
+    """Calls functions and adds up the time of each route."""
+
+    def __init__(self) -> None:
+        self.seconds = {"fields": 0.0, "nodal": 0.0, "ngspice": 0.0}
+
+    def __call__(self, route: str, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        start = time.perf_counter()
+        try:
+            return function(*args, **kwargs)
+        finally:
+            self.seconds[route] += time.perf_counter() - start
+
+
+def _pair(terminals: Sequence[Terminal], probe: Probe) -> list[Terminal]:
+    """Source and sink of a probe."""
+    return [t for name in (probe.source, probe.sink) for t in terminals if t.name == name]
+
+
+def _native(
+    clock: _Clock,
+    contacts: ContactState,
+    terminals: Sequence[Terminal],
+    probes: Sequence[Probe],
+    fields: Sequence[Potential],
+) -> tuple[list[Circuit], list[_Answer], list[_Answer]]:
+    """The circuit of each probe, and what finite elements, solved already, and nodal analysis say about it."""
+    circuits = build_circuits(contacts, [_pair(terminals, probe) for probe in probes])
+    return (
+        circuits,
+        [_from_fields(c, f) for c, f in zip(circuits, fields, strict=True)],
+        [clock("nodal", _nodal, c, p) for c, p in zip(circuits, probes, strict=True)],
+    )
+
+
+def _drive(probe: Probe) -> dict[str, float]:
+    return {probe.source: probe.voltage, probe.sink: 0.0}
+
+
+def _nodal(circuit: Circuit, probe: Probe) -> _Answer:
+    solution = solve_nodal(circuit, _drive(probe))
+    return _Answer(solution.voltage / probe.voltage, float(solution.port_current[circuit.ports.index(probe.source)]))
+
+
+def _from_fields(circuit: Circuit, fields: Potential) -> _Answer:
+    """The finite element solution at the nodes of the circuit; between its own nodes it is linear."""
+    inner, known = circuit.node_fibril >= 0, np.isfinite(fields.potential)
+    voltage = np.zeros(circuit.n_nodes)
+    voltage[circuit.port_node[circuit.ports.index(fields.terminals[0])]] = 1.0
+    if inner.any():
+        # Fibril f covers the keys f to f + 1/2, so that one interpolation serves all fibrils.
+        shrink = 0.5 / fields.xi.max()
+        at, nodes = (f + shrink * xi for f, xi in ((circuit.node_fibril, circuit.node_xi), (fields.fibril, fields.xi)))
+        voltage[inner] = np.interp(at[inner], nodes[known], fields.potential[known] / fields.voltage)
+    return _Answer(voltage, float(fields.currents[0]))
+
+
+def _ngspice(circuits: Sequence[Circuit], probes: Sequence[Probe], timeout: float) -> list[_Answer]:
+    """The answers of one ngspice process to one deck for each probe."""
+    decks = [deck(c, _drive(p)) for c, p in zip(circuits, probes, strict=True)]
+    answers = []
+    for circuit, probe, data in zip(circuits, probes, run_decks(decks, timeout), strict=True):
+        plot = data.plots[0]
+        pin = pin_names(circuit)[circuit.ports.index(probe.source)]
+        voltage = plot.voltage(circuit.node_names)[0] / probe.voltage
+        answers.append(_Answer(voltage, -float(plot.current(f"v{pin}")[0])))
+    return answers
+
+
+def _ngspice_limit(
+    circuits: Sequence[Circuit], probes: Sequence[Probe], known: Sequence[_Answer], yarn: Floats
+) -> float:
+    """What ngspice's rounding may change in a voltage (V per V) or relative current of any probe."""
+    errors = [rounding_errors(c, {p.source: 1.0, p.sink: 0.0}) for c, p in zip(circuits, probes, strict=True)]
+    current = np.array([error[0] for _, error in errors]) * np.abs([probe.voltage for probe in probes])
+    scale = _scale([answer.current for answer in known], yarn)
+    relative = np.divide(current, scale, out=np.zeros(len(probes)), where=scale > 0.0)
+    return float(np.max([*(voltage for voltage, _ in errors), *relative], initial=0.0))
+
+
+def _difference(a: Sequence[_Answer], b: Sequence[_Answer], yarn: Floats) -> tuple[float, float]:
+    """Largest difference of two routes in node voltage and in relative current, over all probes."""
+    voltage = [np.max(np.abs(x.voltage - y.voltage), initial=0.0) for x, y in zip(a, b, strict=True)]
+    return float(np.max(voltage, initial=0.0)), _relative([x.current for x in a], [y.current for y in b], yarn)
+
+
+def _yarn_currents(contacts: ContactState, probes: Sequence[Probe]) -> Floats:
+    """What the best of the yarns would carry alone at the voltage of each probe, A."""
+    mesh = contacts.mesh
+    conductance = np.bincount(mesh.yarn, mesh.electrical_conductivity * mesh.area / mesh.length)
+    currents: Floats = conductance.max(initial=0.0) * np.abs(np.array([probe.voltage for probe in probes]))
+    return currents
+
+
+def _relative(values: Sequence[float], reference: Sequence[float], yarn: Floats) -> float:
+    """Largest difference relative to each reference or, for those that are nothing beside others, to those."""
+    scale = _scale(reference, yarn)
+    difference = np.abs(np.asarray(values) - np.asarray(reference))
+    relative = np.divide(difference, scale, out=np.where(difference > 0.0, np.inf, 0.0), where=scale > 0.0)
+    return float(np.max(relative, initial=0.0))
+
+
+def _scale(currents: Sequence[float], yarn: Floats) -> Floats:
+    """What the difference of each current is measured against."""
+    size = np.abs(np.asarray(currents, dtype=np.float64))
+    largest = size.max(initial=0.0)
+    usual = np.where(size > NO_CURRENT * largest, size, largest)
+    scale: Floats = np.where(usual > NOTHING * yarn, usual, yarn)
+    return scale

@@ -17,7 +17,7 @@ from circuittex.base.errors import CircuitError
 from circuittex.base.frozen import frozen
 from circuittex.base.version import __version__
 from circuittex.electrical.network.circuit import KINDS, Circuit, reached_part
-from circuittex.electrical.spice.names import safe_name, unique_names
+from circuittex.electrical.network.names import safe_name, unique_names
 from circuittex.electrical.spice.pyspice import to_pyspice
 from circuittex.electrical.spice.reader import parse
 

@@ -13,7 +13,7 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.results.records import Record, Study
-from circuittex.study.verify import Verification
+from circuittex.results.verification import Verification
 
 INSULATED = 2.0 / (10 * np.pi * 0.15**2 * 10.0)
 """Ry of an insulated yarn segment of the paper's cell [57], ohm: 0.2829."""

@@ -25,7 +25,7 @@ from circuittex.electrical.network.nodal import NodalSolution, solve_nodal
 from circuittex.netlist import parse, pin_names
 from circuittex.results.records import Study
 from circuittex.results.store import load_study, write_study_start
-from circuittex.study.verify import Verification
+from circuittex.results.verification import Verification
 
 COMMANDS = ["new", "run", "netlist", "verify", "report"]
 

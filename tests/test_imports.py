@@ -1,4 +1,4 @@
-"""The order of the stages, read from the source: who may import whom, and what `import circuittex` costs."""
+"""The order of the rooms, read from the source: who may import whom, and what `import circuittex` costs."""
 
 from __future__ import annotations
 
@@ -13,99 +13,58 @@ import pytest
 import circuittex
 
 PACKAGE = Path(circuittex.__file__).parent
-SHARED = {"frozen", "errors", "compiled", "atomic"}
+ROOMS_OF = {"electrical", "results", "study"}  # folders that hold rooms of their own
 
-# Stage -> the stages and modules it may import, besides SHARED and itself (docs/architecture.md). A dotted name
-# allows one module of a stage only; without a dot the whole stage is allowed.
+# Room -> the rooms and modules it may import, besides `base` and itself (docs/architecture.md). A dotted name that
+# is no room allows one module only.
 STATE = {"contact.state", "geometry.mesh"}
-RESULT_TYPES = {
-    *{*STATE, "design", "fields", "fit", "verify", "mech.configuration"},
-    *{"outcome", "discretisation", "bifurcation"},
-}
-ROUTES = {"fields", "circuit", "nodal", "netlist", "ngspice"}
-OUTPUTS = {"store", "summary", "plot", "report", "vtu"}
+ROUTES = {"electrical.fields", "electrical.network", "netlist", "electrical.spice"}
+RESULT_TYPES = {*STATE, "design", "electrical.fields", "fit", "mech.configuration"}
 ALLOWED: dict[str, set[str]] = {
-    "atomic": set(),
-    "frozen": set(),
-    "compiled": set(),
-    "errors": set(),
-    "options": set(),
-    "units": set(),
-    "design": {"units"},
+    "base": set(),
+    "design": set(),
     "geometry": {"design"},
-    "mech": {"geometry", "design"},
-    "contact": {"mech.configuration", "mech.terms", "mech.pattern", "mech.space", "geometry", "design"},
-    "relaxation": {"design", "geometry", "mech", "contact"},
-    "increment": {"design", "geometry", "mech", "relaxation"},
-    "fields": {*STATE, "design"},
-    "spice_names": set(),
-    "feet": {*STATE, "spice_names"},
-    "circuit": {*STATE, "design", "feet", "spice_names"},
-    "nodal": {"circuit", "geometry.mesh"},
-    "netlist_reader": {"circuit"},
-    "pyspice_export": {"circuit", "spice_names"},
-    "netlist": {"circuit", "spice_names", "netlist_reader", "pyspice_export"},
-    "ngspice": {"netlist", "geometry.mesh"},
-    "fit": {"circuit", "nodal", "design", "geometry.mesh"},
-    "verify": {*ROUTES, *STATE, "geometry.refine", "design", "spice_names"},
-    "verify_reduced": {"circuit", "design", "fit", "netlist", "ngspice"},
-    "export": {*STATE, "circuit", "contact.merge", "design", "fit", "netlist"},
-    "discretisation": {"geometry.mesh"},
-    "outcome": {"geometry.mesh"},
-    "bifurcation": {"outcome"},
-    "transfer": {"geometry.mesh", "mech.configuration"},
-    "error_estimate": {
-        *{"design", "geometry", "mech", "relaxation", "results", "discretisation", "outcome", "record", "transfer"},
-        "workers",
-    },
-    "branch_check": {
-        *{"design", "geometry", "mech", "relaxation", "results", "bifurcation", "outcome", "plan", "record"},
-        "workers",
-    },
+    "solvers": set(),
+    "mech": {"solvers", "geometry", "design"},
+    "contact": {"mech.configuration", "mech.terms", "mech.space", "solvers.pattern", "geometry", "design"},
+    "relaxation": {"design", "geometry", "solvers", "mech", "contact"},
+    "electrical": set(),
+    "electrical.fields": {*STATE, "design"},
+    "electrical.network": {*STATE, "design"},
+    "electrical.spice": {"electrical.network"},
+    "netlist": {"electrical.network", "electrical.spice.reader", "electrical.spice.pyspice"},
+    "fit": {"electrical.network", "design"},
     "results": RESULT_TYPES,
-    "store": {*RESULT_TYPES, "results"},
-    "tubes": {*RESULT_TYPES, "results"},
-    "vtu": {*RESULT_TYPES, "results", "tubes"},
-    "paths": {*RESULT_TYPES, "results"},
-    "work": {*RESULT_TYPES, "results", "paths"},
-    "summary": {*RESULT_TYPES, "results", "work"},
-    "plot": {*RESULT_TYPES, "results", "tubes", "summary", "paths"},
-    "claims": {*RESULT_TYPES, "geometry.levels", "results", "tubes", "summary", "paths"},
-    "report": {*RESULT_TYPES, "results", "summary", "paths", "work", "claims", "plot"},
-    "lock": set(),
-    "workers": set(),
-    "plan": {"design", "export", "geometry.mesh"},
-    "record": {
-        *{"design", "geometry", "mech", "contact", "relaxation", "increment", "fields", "fit", "verify"},
-        *{"verify_reduced", "export", "results", "outcome", "plan"},
-    },
-    "folder": {"export", "results", *OUTPUTS},
-    "schedule": {"mech.configuration", "mech.linear", "increment", "plan", "record", "results", "workers"},
-    "ensemble": {
-        *{"design", "geometry", "folder", "lock", "plan", "plot.style", "report.frame", "report.table", "results"},
-        *{"store", "study", "summary"},
-    },
+    "results.store": {*RESULT_TYPES, "results"},
+    "results.vtk": {*RESULT_TYPES, "results"},
+    "results.plot": {*RESULT_TYPES, "results", "results.vtk"},
+    "results.claims": {*RESULT_TYPES, "geometry.levels", "results", "results.vtk"},
+    "results.report": {*RESULT_TYPES, "results", "results.claims", "results.plot"},
     "study": {
-        *{"design", "geometry.weave", "mech.configuration", "mech.linear", "mech.multifrontal"},
-        *{"branch_check", "error_estimate", "folder", "lock", "plan", "record", "results", "schedule", "workers"},
+        *{"design", "geometry", "mech", "solvers", "contact", "relaxation", *ROUTES, "fit"},
+        *{"results", "results.store", "results.vtk", "results.plot", "results.report"},
+    },
+    "study.ensemble": {
+        *{"design", "geometry", "study", "results", "results.store"},
+        *{"results.plot.style", "results.report.frame", "results.report.table"},
     },
 }
-ANYTHING = {"cli", "__main__"}  # the command line, which nobody imports
+ANYTHING = {"command", "__main__"}  # the command line, which nobody imports
 
 # Libraries that take long to load or are not needed by everybody -> the only stages that know them.
 LIBRARIES: dict[str, set[str]] = {
-    "skfem": {"mech", "fields"},
-    "numba": {"compiled"},
-    "pypardiso": {"mech"},
-    "threadpoolctl": {"mech"},
-    "networkx": {"circuit"},
-    "PySpice": {"pyspice_export"},
-    "h5py": {"store"},
-    "filelock": {"lock"},
-    "meshio": {"vtu"},
-    "matplotlib": {"plot", "ensemble"},
-    "distributed": {"ensemble"},
-    "dask": {"ensemble"},
+    "skfem": {"mech", "electrical.fields"},
+    "numba": {"base"},
+    "pypardiso": {"solvers"},
+    "threadpoolctl": {"solvers"},
+    "networkx": {"electrical.network"},
+    "PySpice": {"electrical.spice"},
+    "h5py": {"results.store"},
+    "filelock": {"base"},
+    "meshio": {"results.vtk"},
+    "matplotlib": {"results.plot", "study.ensemble"},
+    "distributed": {"study.ensemble"},
+    "dask": {"study.ensemble"},
 }
 
 
@@ -146,14 +105,17 @@ INTERNAL = {
 }
 
 
-def stage(module: str) -> str:
-    return module.split(".")[0]
+def room(module: str) -> str:
+    """The room of a module: a folder at the top or in one of `ROOMS_OF`; 'netlist' and 'fit' are their own."""
+    parts = module.split(".")
+    inner = parts[0] in ROOMS_OF and len(parts) > 1 and (PACKAGE / parts[0] / parts[1]).is_dir()
+    return ".".join(parts[: 2 if inner else 1])
 
 
 def violations(module: str, targets: set[str]) -> list[str]:
     """The targets that `module` must not import."""
-    allowed = ALLOWED[stage(module)] | SHARED | {stage(module), ""}
-    return sorted(t for t in targets if t not in allowed and stage(t) not in allowed)
+    allowed = ALLOWED[room(module)] | {"base", room(module), ""}
+    return sorted(t for t in targets if t not in allowed and room(t) not in allowed)
 
 
 def test_reader_sees_every_kind_of_import() -> None:
@@ -162,19 +124,19 @@ def test_reader_sees_every_kind_of_import() -> None:
 
 
 def test_rule_catches_a_forbidden_import() -> None:
-    assert violations("fields", {"contact.state", "circuit", "contact.force"}) == ["circuit", "contact.force"]
+    assert violations("electrical.fields.line", {"contact.state", "fit", "contact.law"}) == ["contact.law", "fit"]
 
 
 def test_every_module_has_its_place_in_the_table() -> None:
-    assert {stage(m) for m in MODULES if m} - ANYTHING <= set(ALLOWED)
+    assert {room(m) for m in MODULES if m} - ANYTHING == set(ALLOWED)
 
 
-@pytest.mark.parametrize("module", sorted(m for m in MODULES if m and stage(m) not in ANYTHING))
-def test_module_imports_only_what_its_stage_may(module: str) -> None:
+@pytest.mark.parametrize("module", sorted(m for m in MODULES if m and room(m) not in ANYTHING))
+def test_module_imports_only_what_its_room_may(module: str) -> None:
     assert violations(module, INTERNAL[module]) == []
 
 
-def test_modules_take_only_the_version_from_the_package() -> None:
+def test_modules_take_nothing_from_the_package() -> None:
     """The package's lazy names are for users; inside, a module names the module it means."""
     taken = {
         (module, name)
@@ -182,7 +144,7 @@ def test_modules_take_only_the_version_from_the_package() -> None:
         for name in imports(path.read_text(encoding="utf-8"))
         if module and resolve(name) == ""
     }
-    assert {name for _, name in taken} <= {"circuittex.__version__"}
+    assert {name for _, name in taken} == set()
 
 
 def test_no_cycles() -> None:
@@ -191,23 +153,24 @@ def test_no_cycles() -> None:
 
 
 def test_the_three_routes_do_not_know_one_another() -> None:
-    for route in ("fields", "nodal", "ngspice"):
+    routes = {"electrical.fields.solution", "electrical.network.nodal", "electrical.spice.ngspice"}
+    for route in routes:
         reached, waiting = set(), {route}
         while waiting:
             reached |= waiting
             waiting = {t for m in waiting for t in INTERNAL[m]} - reached - {""}
-        assert reached & {"fields", "nodal", "ngspice"} == {route}
+        assert reached & routes == {route}
 
 
 def test_nobody_imports_the_command_line() -> None:
-    assert [m for m, targets in INTERNAL.items() if "cli" in targets] == ["__main__"]
-    assert [m for m, targets in INTERNAL.items() if "options" in targets] == ["cli"]
+    users = {m for m, targets in INTERNAL.items() if any(room(t) == "command" for t in targets)}
+    assert {m for m in users if room(m) != "command"} == {"__main__"}
 
 
 @pytest.mark.parametrize("library", sorted(LIBRARIES))
 def test_library_is_known_only_where_it_belongs(library: str) -> None:
     users = {
-        stage(module)
+        room(module)
         for module, path in MODULES.items()
         if library in {name.split(".")[0] for name in imports(path.read_text(encoding="utf-8"))}
     }
@@ -223,7 +186,7 @@ HEAVY = ["numpy", "scipy", "numba", "skfem", "matplotlib", "PySpice", "networkx"
         ("import circuittex", HEAVY),
         ("import circuittex; circuittex.__version__, dir(circuittex)", HEAVY),
         ("import circuittex; circuittex.load_design", [m for m in HEAVY if m != "numpy"]),
-        ("import circuittex.cli as c\ntry: c.main(['--help'])\nexcept SystemExit: pass", HEAVY),
+        ("import circuittex.command.cli as c\ntry: c.main(['--help'])\nexcept SystemExit: pass", HEAVY),
     ],
 )
 def test_light_in_a_bare_process(code: str, forbidden: list[str]) -> None:
@@ -240,7 +203,7 @@ def test_every_public_name_resolves() -> None:
 
 def test_no_public_name_is_a_module_too() -> None:
     """Python sets a module as an attribute of its package: it would take the place of the lazy name."""
-    assert not set(circuittex.__all__) & {stage(module) for module in MODULES}
+    assert not set(circuittex.__all__) & {room(module).split(".")[0] for module in MODULES}
 
 
 def test_type_checkers_see_the_same_names() -> None:

@@ -19,8 +19,8 @@ from circuittex import __version__
 from circuittex.base.errors import CircuitError
 from circuittex.base.frozen import same
 from circuittex.electrical.network.circuit import KINDS, Circuit, build_circuit, reached_part, reduced_circuit
+from circuittex.electrical.network.names import safe_name, unique_names
 from circuittex.electrical.network.nodal import solve_nodal
-from circuittex.electrical.spice.names import safe_name, unique_names
 from circuittex.electrical.spice.ngspice import run_deck, run_decks
 from circuittex.netlist import (
     Header,

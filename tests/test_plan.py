@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from circuittex.design import Loading, plain_weave, shear, uniaxial
-from circuittex.electrical.spice.names import safe_name
+from circuittex.electrical.network.names import safe_name
 from circuittex.study.plan import plan, state_names
 
 

@@ -134,8 +134,9 @@ def _probe(design: Design, name: str | None) -> Probe:
 def _verify(options: argparse.Namespace) -> int:
     study = _load(options.results)
     records = _select(study, options.state)
+    from circuittex.results.verification import AGREEMENT
     from circuittex.study.export import simplified
-    from circuittex.study.verify import AGREEMENT, verify
+    from circuittex.study.verify import verify
 
     design = study.design
     agree = True

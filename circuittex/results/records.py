@@ -18,7 +18,7 @@ from circuittex.mech.configuration import Configuration
 from circuittex.results.bifurcation import BranchCheck
 from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.outcome import Outcome
-from circuittex.study.verify import Verification
+from circuittex.results.verification import Verification
 
 
 @frozen

@@ -78,8 +78,8 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results.bifurcation import BranchCheck, branch_statement, current_difference, force_difference
 from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.records import Record, Study
+from circuittex.results.verification import AGREEMENT
 from circuittex.results.work import EnergyBalance, step_balances
-from circuittex.study.verify import AGREEMENT
 
 FORMAT = 1
 

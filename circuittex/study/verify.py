@@ -20,9 +20,7 @@ from circuittex.electrical.network.nodal import rounding_errors, solve_nodal
 from circuittex.electrical.spice.ngspice import run_decks
 from circuittex.geometry.refine import refined
 from circuittex.netlist import deck, pin_names
-
-AGREEMENT = 1e-9
-"""Routes on the same discretisation that differ by more than this (relative current, V per V) do not agree."""
+from circuittex.results.verification import AGREEMENT, Verification
 
 NO_CURRENT = 1e-6
 """A probe with less than this fraction of the largest probe current is measured against the largest."""
@@ -32,45 +30,6 @@ NOTHING = 1e-12
 
 P = ParamSpec("P")
 T = TypeVar("T")
-
-
-@frozen
-class Verification:
-    """Largest differences between the routes over all probes of one contact state."""
-
-    routes: tuple[str, ...]
-    """The routes that answered, of 'fields', 'nodal', 'ngspice'."""
-    max_voltage_difference: float
-    """Largest difference of two routes in one node voltage, V per volt of the probe."""
-    max_current_difference: float
-    """Largest difference of two routes in one terminal current, relative to the current of that probe."""
-    native_difference: float
-    """Largest difference between finite elements and nodal analysis alone, in voltage (V per V) or relative current."""
-    ngspice_limit: float
-    """Difference that ngspice's rounding explains, in voltage (V per V) or relative current; 0 where it did not
-    check."""
-    merge_error: float
-    """Largest relative change of a probe current by the simplification of the contacts."""
-    field_difference: float
-    """Largest relative difference of a probe current between the mechanical mesh and the circuit, both at full
-    resolution: the discretisation error of the former."""
-    fields_seconds: float
-    """Time spent in finite elements, s."""
-    nodal_seconds: float
-    """Time spent in nodal solutions, s."""
-    ngspice_seconds: float
-    """Time spent in ngspice, s; nan where it did not check."""
-    ngspice_checked: bool
-    """Whether ngspice answered every probe and its answers were compared."""
-    note: str
-    """What a reader must know, such as why ngspice did not check or that routes disagree; empty if all is well."""
-
-    @property
-    def agrees(self) -> bool:
-        """Whether all routes agree: to `AGREEMENT`, and ngspice to its rounding where that is coarser."""
-        loosest = max(AGREEMENT, self.ngspice_limit)
-        differences = self.max_voltage_difference, self.max_current_difference
-        return self.native_difference <= AGREEMENT and all(difference <= loosest for difference in differences)
 
 
 @frozen

@@ -23,7 +23,7 @@ from circuittex.electrical.network.feet import (
     place_names,
     sites,
 )
-from circuittex.electrical.spice.names import unique_names
+from circuittex.electrical.network.names import unique_names
 from circuittex.geometry.mesh import FibrilMesh
 
 SEGMENT, CONTACT, REDUCED = 0, 1, 2

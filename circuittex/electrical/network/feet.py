@@ -7,7 +7,7 @@ import numpy as np
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.errors import CircuitError
 from circuittex.contact.state import ContactState
-from circuittex.electrical.spice.names import unique_names
+from circuittex.electrical.network.names import unique_names
 from circuittex.geometry.mesh import FibrilMesh
 
 _OUTSIDE = 1e-12

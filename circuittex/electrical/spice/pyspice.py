@@ -9,7 +9,7 @@ from typing import Any
 
 from circuittex.base.errors import CircuitError
 from circuittex.electrical.network.circuit import Circuit, reached_part
-from circuittex.electrical.spice.names import unique_names
+from circuittex.electrical.network.names import unique_names
 
 LARGEST = 2000
 """Resistors of the largest circuit that is given to PySpice."""

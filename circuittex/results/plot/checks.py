@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from circuittex.results.plot.style import COLOURS, GREY, MARKERS, new_figure, style
 from circuittex.results.records import Record, Study
-from circuittex.study.verify import AGREEMENT
+from circuittex.results.verification import AGREEMENT
 
 
 def verification_figure(study: Study) -> Figure:

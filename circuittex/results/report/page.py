@@ -24,7 +24,7 @@ from circuittex.results.report.parameters import parameters
 from circuittex.results.report.table import number as _number
 from circuittex.results.report.table import table as _table
 from circuittex.results.summary import agrees, confirmed, difference, effort, insulated_resistance, ngspice_statement
-from circuittex.study.verify import AGREEMENT
+from circuittex.results.verification import AGREEMENT
 
 
 def write_report(folder: str | Path, study: Study, beside: Sequence[Study] = ()) -> Path:

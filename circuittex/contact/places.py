@@ -16,7 +16,7 @@ def contact_places(contacts: ContactState, configuration: Configuration) -> Floa
     `configuration` is the one that the contact state was taken from.
 
     >>> import circuittex as ct
-    >>> design = ct.plain_weave(yarns=1, rows=(1,))
+    >>> design = ct.plain_weave(yarns=1)
     >>> mesh = ct.build_mesh(design)
     >>> at = ct.initial_configuration(mesh)
     >>> bool(np.abs(contact_places(ct.contacts_of(design, mesh, at), at)).max() < 1.0)

@@ -12,11 +12,11 @@ from circuittex.base.arrays import Floats, Ints
 from circuittex.base.errors import ConvergenceError
 from circuittex.contact.penalty import PenaltyContact
 from circuittex.mech.beam import Beam
+from circuittex.mech.linear import LinearSolver, Solve
 from circuittex.mech.minimise import minimise
+from circuittex.mech.pattern import Pattern
 from circuittex.mech.space import BeamSpace
 from circuittex.mech.terms import ForceTerm
-from circuittex.solvers.linear import LinearSolver, Solve
-from circuittex.solvers.pattern import Pattern
 
 SEARCH, CLOSEST, ENERGY = "candidate search", "closest points, contact energy", "beam energy"
 BEAM, CONTACT, PATTERN, MASS = "beam assembly", "contact assembly", "pattern", "mass matrix"

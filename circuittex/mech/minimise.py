@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.errors import ConvergenceError
 from circuittex.base.frozen import frozen
+from circuittex.mech.linear import LinearSolver, Solve
+from circuittex.mech.pattern import Pattern, build_pattern, diagonal, multiply
 from circuittex.mech.terms import ForceTerm
-from circuittex.solvers.linear import LinearSolver, Solve
-from circuittex.solvers.pattern import Pattern, build_pattern, diagonal, multiply
 
 FIRST_SHIFT, LEAST_SHIFT = 1e-2, 1e-5
 """Shifts, N/mm per g. The least keeps the fibrils' free spin about their axes, a true zero mode, solvable; it is a

@@ -9,7 +9,11 @@ from typing import TYPE_CHECKING, Any
 from circuittex.base.version import __version__
 
 _HOMES = {
-    "design": ("Design", "design_hash", "load_design", "parse_design", "plain_weave", "starter"),
+    "design": (
+        *("ContactLaw", "Design", "Electrical", "Loading", "Material", "MaterialPair", "Numerics", "Packing"),
+        *("Probe", "Terminal", "Weave", "Yarn", "biaxial", "design_hash", "equal_steps", "load_design", "load_unload"),
+        *("parse_design", "plain_weave", "shear", "starter", "uniaxial"),
+    ),
     "geometry.weave": ("build_mesh",),
     "mech.configuration": ("initial_configuration",),
     "contact.state": ("ContactState",),
@@ -38,12 +42,28 @@ if TYPE_CHECKING:
     from circuittex.contact.extract import contacts_of as contacts_of
     from circuittex.contact.merge import simplify as simplify
     from circuittex.contact.state import ContactState as ContactState
+    from circuittex.design import ContactLaw as ContactLaw
     from circuittex.design import Design as Design
+    from circuittex.design import Electrical as Electrical
+    from circuittex.design import Loading as Loading
+    from circuittex.design import Material as Material
+    from circuittex.design import MaterialPair as MaterialPair
+    from circuittex.design import Numerics as Numerics
+    from circuittex.design import Packing as Packing
+    from circuittex.design import Probe as Probe
+    from circuittex.design import Terminal as Terminal
+    from circuittex.design import Weave as Weave
+    from circuittex.design import Yarn as Yarn
+    from circuittex.design import biaxial as biaxial
     from circuittex.design import design_hash as design_hash
+    from circuittex.design import equal_steps as equal_steps
     from circuittex.design import load_design as load_design
+    from circuittex.design import load_unload as load_unload
     from circuittex.design import parse_design as parse_design
     from circuittex.design import plain_weave as plain_weave
+    from circuittex.design import shear as shear
     from circuittex.design import starter as starter
+    from circuittex.design import uniaxial as uniaxial
     from circuittex.electrical.fields import solve_fields as solve_fields
     from circuittex.electrical.network.circuit import Circuit as Circuit
     from circuittex.electrical.network.circuit import build_circuit as build_circuit

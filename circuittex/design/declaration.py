@@ -77,6 +77,22 @@ def number(
     return _metadata(check, read, wanted, f"{allowed} {shown_unit}".strip(), text, note)
 
 
+def relative(unit: str, note: str, *, shown: str, at_most: float) -> Mapping[str, Key]:
+    """Metadata of a field with a pure number, in parts of something, or with a quantity in `unit`, kept as text.
+
+    >>> relative("N", "of forces", shown="1e-6", at_most=1)["key"].check("2 mN", "tolerance")
+    '0.002 N'
+    """
+
+    def check(value: object, path: str) -> object:
+        if isinstance(value, str):
+            return f"{real(quantity(value, unit, path), path, unit, above=0)!r} {unit}"
+        return real(value, path, f"or a text in {unit}", above=0, at_most=at_most)
+
+    wanted = f"a plain number or a string in {unit}"
+    return _metadata(check, _as_it_is, wanted, f"> 0 and <= {at_most:g}, or > 0 {unit}", shown, note)
+
+
 def count(note: str, at_least: int, at_most: int, *, shown: str, words: tuple[str, ...] = ()) -> Mapping[str, Key]:
     """Metadata of a field with a whole number, or one of `words` in its place.
 

@@ -26,9 +26,9 @@ from circuittex.mech.terms import ForceTerm
 from circuittex.solvers.linear import LinearSolver, Solve
 from circuittex.solvers.pattern import DOFS, Pattern, build_pattern, diagonal, multiply
 
-FIRST_SHIFT, LEAST_SHIFT = 3.0, 3e-3
-"""Shifts, in parts of `Scales.metric`: of a fibril clamped at both ends of a span, the softest mode is at 500. The
-least keeps the fibrils' free spin about their axes, a true zero mode, solvable."""
+FIRST_SHIFT, LEAST_SHIFT = 1.0, 1e-3
+"""Shifts, in parts of `Scales.metric`. The least keeps the fibrils' free spin about their axes, a true zero mode,
+solvable; it is a hundred thousand times softer than the softest bending mode of a span."""
 SOFTENING = (1.0, 0.7, 0.3)
 """Parts of the softening tangent that are tried far from equilibrium, where a descent through sliding contacts
 takes fewer iterations with less of it than with a larger shift alone. The search begins one place before the part
@@ -135,7 +135,8 @@ class System:
         assert self.pattern is not None
         stiffness = self.data[diagonal(self.pattern)].reshape(-1, DOFS)[:, :3].max(axis=1)
         rounded = ROUNDED * stiffness * np.abs(q).reshape(-1, DOFS)[:, :3].max(axis=1)
-        return np.maximum(tolerance * self.forces, np.maximum(self.scales.over_fibrils(rounded), force_tolerance))
+        own = tolerance * np.minimum(self.forces, self.scales.largest_force)
+        return np.maximum(own, np.maximum(self.scales.over_fibrils(rounded), force_tolerance))
 
     def energy(self, q: Floats) -> float:
         return sum(term.energy(q) for term in self.terms)
@@ -156,7 +157,7 @@ def minimise(
     fixed: Ints,
     solver: LinearSolver,
     before: Floats | None = None,
-    tolerance: float = 1e-6,
+    tolerance: float = 1e-5,
     force_tolerance: float = 0.0,
     max_iterations: int = 200,
     report: Callable[[int, float], None] | None = None,

@@ -17,9 +17,18 @@ from circuittex.base.frozen import frozen
 from circuittex.mech.space import BeamSpace
 from circuittex.solvers.pattern import DOFS, Pattern, add_elements
 
-TURNING = 2.0**-19
-"""Stiffness per length that holds the directors, in parts of E A: far above the round-off of the tangent, which is
-1e-16 of it, and above what the section's rule makes of a spin; far below the bending of any fibril."""
+BENDING = 128 / 45
+"""Stiffness per length that holds the positions, in parts of E I / span^4: a fibril clamped at both ends of a span has
+its softest mode at 500 (4.73^4). Of the paper's fibrils this is 1e-2 N/mm per mm3, with which they relax well."""
+TURNING = 5.625e-6
+"""Stiffness per length that holds the directors, in parts of E A. That is far above the round-off of the tangent
+and above what the section's rule makes of a spin, and far below the bending of fibrils of the paper's slenderness, 0.075
+of a span."""
+
+
+STRETCH = 1 / 8
+"""Forces above E A times this ask for no smaller free force than that: a fibril stretched so far is out of the common.
+"""
 
 
 @frozen
@@ -30,6 +39,8 @@ class Scales:
     """Half the span, mm: a moment on a director over it is a force, and it is the unit in which steps are measured."""
     energy: float
     """A power of two near the largest E A span, N mm."""
+    largest_force: Floats
+    """(F,) N: no force above it counts as a fibril's own when a free force is compared with that."""
     first_node: Ints
     """(F + 1,) offsets of the fibrils into the nodes."""
     metric: Callable[[Pattern], Floats]
@@ -58,9 +69,8 @@ class Scales:
 def fibril_scales(space: BeamSpace, span: float) -> Scales:
     """The scales of fibrils that bend over a `span` (mm): in a weave from crossing to crossing.
 
-    The metric is E I / span^4 for the positions, per length of axis: a fibril clamped at both ends of a span has its
-    softest mode at 500 of it (4.73^4). For the directors it is `TURNING` E A. Without tension or contact a fibril's
-    spin about its axis costs no energy, so only this keeps the tangent from being singular.
+    Per length of axis the metric is `BENDING` E I / span^4 for the positions and `TURNING` E A for the directors. A
+    fibril's spin about its axis costs no energy, so only the latter keeps the tangent from being singular.
 
     >>> from circuittex.design import plain_weave
     >>> from circuittex.geometry.weave import build_mesh
@@ -70,14 +80,15 @@ def fibril_scales(space: BeamSpace, span: float) -> Scales:
     """
     mesh = space.mesh
     stretching = mesh.youngs_modulus * mesh.area
-    bending = stretching * mesh.radius**2 / 4
+    bending = BENDING * stretching * mesh.radius**2 / 4
 
     area = span * span  # and not span**4, which a power function may round otherwise at another scale
 
     def metric(pattern: Pattern) -> Floats:
         return line_matrix(space, pattern, bending / (area * area), TURNING * stretching)
 
-    return Scales(span / 2, power_of_two(float(stretching.max()) * span), mesh.first_node, metric)
+    energy = power_of_two(float(stretching.max()) * span)
+    return Scales(span / 2, energy, STRETCH * stretching, mesh.first_node, metric)
 
 
 def line_matrix(space: BeamSpace, pattern: Pattern, position: Floats, director: Floats) -> Floats:

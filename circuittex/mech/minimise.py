@@ -219,7 +219,7 @@ def minimise(
         shift = max(LEAST_SHIFT, shift / 4) if step == 1.0 else (shift if step >= 0.25 else 4 * shift)
     trouble = "the forces balance, but the tangent is not positive definite: a saddle, not a minimum"
     if not balanced:
-        worst = int(np.argmax(left / limits))
+        worst = int(np.argmax(left - limits))
         trouble = f"a free force of {left[worst]:.3g} N is left, above the limit of {limits[worst]:.3g} N"
     raise ConvergenceError(f"no equilibrium after {len(history) - 1} iterations: {trouble}", np.array(history))
 

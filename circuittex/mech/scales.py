@@ -21,9 +21,9 @@ BENDING = 128 / 45
 """Stiffness per length that holds the positions, in parts of E I / span^4: a fibril clamped at both ends of a span has
 its softest mode at 500 (4.73^4). Of the paper's fibrils this is 1e-2 N/mm per mm3, with which they relax well."""
 TURNING = 5.625e-6
-"""Stiffness per length that holds the directors, in parts of E A. That is far above the round-off of the tangent
-and above what the section's rule makes of a spin, and far below the bending of fibrils of the paper's slenderness, 0.075
-of a span."""
+"""Stiffness per length that holds the directors, in parts of E A. That is far above the round-off of the tangent and
+above what the section's rule makes of a spin, and far below what bends fibrils of the paper's slenderness, R / span =
+0.075."""
 
 
 STRETCH = 1 / 8

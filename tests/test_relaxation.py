@@ -33,7 +33,7 @@ def solved(design: Design, mesh: FibrilMesh, start: Configuration | None = None)
 @pytest.fixture(scope="module")
 def cell() -> tuple[Design, FibrilMesh, Equilibrium]:
     """Three fibrils a yarn in two rows, relaxed."""
-    design, mesh = small_cell((1, 2), elements=6, tolerance=TIGHT)
+    design, mesh = small_cell((1, 2), elements=6, tolerance=f"{TIGHT} N")
     return design, mesh, solved(design, mesh)
 
 
@@ -46,7 +46,7 @@ def free_nodes(mesh: FibrilMesh) -> np.ndarray:
 
 def test_forces_balance(cell: Cell) -> None:
     design, mesh, equilibrium = cell
-    assert equilibrium.residual <= design.numerics.tolerance
+    assert equilibrium.residual <= design.numerics.force_tolerance
     assert np.abs(equilibrium.reaction[free_nodes(mesh)]).max() <= equilibrium.residual
     assert np.abs(equilibrium.reaction.sum(axis=0)).max() <= mesh.n_nodes * equilibrium.residual
     moment = np.cross(equilibrium.configuration.r, equilibrium.reaction).sum(axis=0)
@@ -92,7 +92,7 @@ def test_section_forces_at_the_ends_are_the_clamp_forces() -> None:
 
     P = mu (s - 1/s) with mu = E / 2, at a stretch s = 1.1.
     """
-    design, mesh = small_cell((1,), elements=4, tolerance=TIGHT)
+    design, mesh = small_cell((1,), elements=4, tolerance=f"{TIGHT} N")
     design = replace(design, contact=replace(design.contact, penalty=1e-12))
     flat = mesh.position * [1.0, 1.0, 0.0]
     mesh = replace(mesh, position=flat, directors=_level_directors(mesh))
@@ -155,7 +155,7 @@ def test_an_unconverged_state_is_never_returned(limit: int) -> None:
     with pytest.raises(ConvergenceError, match=f"no equilibrium after {limit} iterations") as caught:
         solved(design, mesh)
     assert caught.value.history.shape == (limit + 1, 4)
-    assert np.all(caught.value.history[:, 0] > design.numerics.tolerance)
+    assert np.all(caught.value.history[:, 0] > design.numerics.force_tolerance)
 
 
 def test_a_start_that_is_inside_out_is_an_error(cell: Cell) -> None:

@@ -127,6 +127,15 @@ class Numerics:
         check(self, "numerics")
 
     @property
+    def allowed(self) -> str:
+        """The tolerance in words, for a sentence.
+
+        >>> Numerics().allowed
+        '1e-05 of the forces on its fibril'
+        """
+        return self.tolerance if isinstance(self.tolerance, str) else f"{self.tolerance:g} of the forces on its fibril"
+
+    @property
     def relative_tolerance(self) -> float:
         """The tolerance in parts of the forces; 0 where it is stated in N."""
         return 0.0 if isinstance(self.tolerance, str) else self.tolerance

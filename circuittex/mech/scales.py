@@ -66,11 +66,15 @@ class Scales:
         return np.asarray(np.maximum.reduceat(of_node, self.first_node[:-1]))
 
 
-def fibril_scales(space: BeamSpace, span: float) -> Scales:
-    """The scales of fibrils that bend over a `span` (mm): in a weave from crossing to crossing.
+def fibril_scales(space: BeamSpace, span: float, penalty: float | Floats = 0.0) -> Scales:
+    """The scales of fibrils that bend over a `span` (mm), in a weave from crossing to crossing, and touch.
 
-    Per length of axis the metric is `BENDING` E I / span^4 for the positions and `TURNING` E A for the directors. A
-    fibril's spin about its axis costs no energy, so only the latter keeps the tangent from being singular.
+    `penalty` is the largest P* of each fibril's contacts, (F,) or one for all, N/mm2.
+
+    Per length of axis the metric is `BENDING` E I / span^4 for the positions and `TURNING` E A for the directors, with
+    the modulus E or, where contacts are harder than Hertz's, 2 P*: the shifts must cope with their forces, which turn
+    as fibrils slide. A fibril's spin about its axis costs no energy, so only the directors' part keeps the tangent from
+    being singular.
 
     >>> from circuittex.design import plain_weave
     >>> from circuittex.geometry.weave import build_mesh
@@ -80,12 +84,13 @@ def fibril_scales(space: BeamSpace, span: float) -> Scales:
     """
     mesh = space.mesh
     stretching = mesh.youngs_modulus * mesh.area
-    bending = BENDING * stretching * mesh.radius**2 / 4
+    stiffer = np.maximum(mesh.youngs_modulus, 2 * np.asarray(penalty)) * mesh.area
+    bending = BENDING * stiffer * mesh.radius**2 / 4
 
     area = span * span  # and not span**4, which a power function may round otherwise at another scale
 
     def metric(pattern: Pattern) -> Floats:
-        return line_matrix(space, pattern, bending / (area * area), TURNING * stretching)
+        return line_matrix(space, pattern, bending / (area * area), TURNING * stiffer)
 
     energy = power_of_two(float(stretching.max()) * span)
     return Scales(span / 2, energy, STRETCH * stretching, mesh.first_node, metric)

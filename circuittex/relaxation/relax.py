@@ -8,6 +8,7 @@ import numpy as np
 
 from circuittex.base.arrays import Floats
 from circuittex.base.frozen import frozen, same
+from circuittex.contact.law import largest_penalty
 from circuittex.contact.penalty import PenaltyContact
 from circuittex.design import Design
 from circuittex.geometry.mesh import FibrilMesh
@@ -71,7 +72,7 @@ def relax(
     minimum = minimise(
         [beam, contact],
         space.vector(start),
-        scales=fibril_scales(space, design.weave.pitch),
+        scales=fibril_scales(space, design.weave.pitch, largest_penalty(mesh, design.contact)),
         fixed=space.fixed,
         solver=solver if solver is not None else MultifrontalSolver(),
         before=space.vector(before) if before is not None and moved else None,

@@ -14,7 +14,7 @@ from math import inf
 from textwrap import wrap
 from typing import Any
 
-from circuittex.design.checks import one_of, real, store, truth, whole
+from circuittex.design.checks import one_of, real, refuse, store, truth, whole
 from circuittex.design.table import Table, quantity
 
 _KEY = "key"
@@ -85,8 +85,11 @@ def relative(unit: str, note: str, *, shown: str, at_most: float) -> Mapping[str
     """
 
     def check(value: object, path: str) -> object:
-        if isinstance(value, str):
-            return f"{real(quantity(value, unit, path), path, unit, above=0)!r} {unit}"
+        if isinstance(value, str):  # of any size: what it is compared with may be as small
+            size = quantity(value, unit, path)
+            if not size > 0.0:
+                raise refuse(path, value, f"it must be > 0 {unit}")
+            return f"{size!r} {unit}"
         return real(value, path, f"or a text in {unit}", above=0, at_most=at_most)
 
     wanted = f"a plain number or a string in {unit}"

@@ -138,7 +138,7 @@ def test_real_fibrils_relax_as_the_papers_do(radius: float, modulus: float, dens
 
     energy, iterations = relaxed(0.15, 10.0, 1.0)
     there, took = relaxed(radius, modulus, density)
-    assert there == pytest.approx(energy, rel=1e-8)  # of second order in what the tolerance leaves, 1e-5
+    assert there == pytest.approx(energy, rel=1e-8)  # of second order in what the tolerance leaves, 2e-5
     assert took <= 2 * iterations
 
 

@@ -70,11 +70,11 @@ class Numerics:
     """Degree of the section's quadrature rule. Below 6 its points tell how a fibril is spun about its axis, which
     a round fibril does not know, and the relaxation creeps along that spin."""
     tolerance: float | str = field(
-        default=1e-5,
+        default=2e-5,
         metadata=relative(
             "N",
             "largest free force that counts as equilibrium, in parts of the forces on its fibril; or in newtons",
-            shown="1e-5",
+            shown="2e-5",
             at_most=0.1,
         ),
     )
@@ -131,7 +131,7 @@ class Numerics:
         """The tolerance in words, for a sentence.
 
         >>> Numerics().allowed
-        '1e-05 of the forces on its fibril'
+        '2e-05 of the forces on its fibril'
         """
         return self.tolerance if isinstance(self.tolerance, str) else f"{self.tolerance:g} of the forces on its fibril"
 

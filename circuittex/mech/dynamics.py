@@ -159,7 +159,7 @@ def march(
     fixed: Ints,
     solver: LinearSolver,
     dt: float,
-    tolerance: float = 1e-6,
+    tolerance: float,
     max_iterations: int = 100,
 ) -> Iterator[Instant]:
     """Endless steps of backward Euler of `dt` seconds from q (n_dofs,) and `velocity` (n_dofs,), one by one.
@@ -224,7 +224,7 @@ def relax_dynamically(
     t_relax: float,
     t_step: float = 0.0,
     velocity: Floats | None = None,
-    tolerance: float = 1e-6,
+    tolerance: float,
     max_iterations: int = 100,
 ) -> Rest:
     """Step 1 of Algorithm 1: move for `t_step`, stop, and relax with damping until at rest.

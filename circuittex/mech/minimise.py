@@ -157,7 +157,7 @@ def minimise(
     fixed: Ints,
     solver: LinearSolver,
     before: Floats | None = None,
-    tolerance: float = 1e-5,
+    tolerance: float = 2e-5,
     force_tolerance: float = 0.0,
     max_iterations: int = 200,
     report: Callable[[int, float], None] | None = None,

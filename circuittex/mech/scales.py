@@ -26,7 +26,7 @@ above what the section's rule makes of a spin, and far below what bends fibrils 
 0.075."""
 
 
-STRETCH = 1 / 8
+STRETCH = 1 / 16
 """Forces above E A times this ask for no smaller free force than that: a fibril stretched so far is out of the common.
 """
 

@@ -30,11 +30,11 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.dynamics import STEP_TOLERANCE, Inertia, damping_matrix
+from circuittex.mech.linear import LinearSolver, Solve
+from circuittex.mech.multifrontal import MultifrontalSolver
+from circuittex.mech.pattern import Pattern, build_pattern, diagonal
 from circuittex.mech.terms import ForceTerm
 from circuittex.relaxation.relax import force_terms, relax
-from circuittex.solvers.linear import LinearSolver, Solve
-from circuittex.solvers.multifrontal import MultifrontalSolver
-from circuittex.solvers.pattern import Pattern, build_pattern, diagonal
 
 GAMMA = 1e-4
 """The paper's damping, 0.1 N s/m for every mm3, in N s/mm4."""

@@ -30,8 +30,8 @@ from watch import PARTS, descend
 from circuittex.design import Design, plain_weave
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation.relax import force_terms, relax
-from circuittex.solvers.multifrontal import MultifrontalSolver
 
 Result = dict[str, Any]
 TOLERANCE = 1e-6

@@ -13,12 +13,12 @@ from circuittex.base.errors import ConvergenceError
 from circuittex.contact.penalty import PenaltyContact
 from circuittex.design import plain_weave
 from circuittex.mech.beam import Beam
+from circuittex.mech.linear import LinearSolver, Solve
 from circuittex.mech.minimise import minimise
+from circuittex.mech.pattern import Pattern
 from circuittex.mech.scales import fibril_scales
 from circuittex.mech.space import BeamSpace
 from circuittex.mech.terms import ForceTerm
-from circuittex.solvers.linear import LinearSolver, Solve
-from circuittex.solvers.pattern import Pattern
 
 SEARCH, CLOSEST, ENERGY = "candidate search", "closest points, contact energy", "beam energy"
 BEAM, CONTACT, PATTERN, METRIC = "beam assembly", "contact assembly", "pattern", "metric"

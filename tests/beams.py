@@ -18,11 +18,11 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.mech.minimise import Minimum, minimise
+from circuittex.mech.multifrontal import MultifrontalSolver
+from circuittex.mech.pattern import DOFS, Pattern, build_pattern
 from circuittex.mech.scales import fibril_scales
 from circuittex.mech.space import BeamSpace, beam_space
 from circuittex.mech.terms import ForceTerm
-from circuittex.solvers.multifrontal import MultifrontalSolver
-from circuittex.solvers.pattern import DOFS, Pattern, build_pattern
 
 MODULUS = 10.0
 """E in MPa, that of the paper's fibrils."""

@@ -19,6 +19,7 @@ FOLDER = Path(__file__).parents[1] / "benchmarks"
 SCRIPTS = [
     "algorithm1",
     "assembly",
+    "cholesky",
     "compile",
     "dolfinx_beam",
     "invariance",
@@ -95,6 +96,14 @@ def test_assembly_agrees_with_the_form() -> None:
     assert row[-1] < ROUND_OFF
 
 
+def test_both_factorisations_solve_the_same_panel() -> None:
+    cholesky = script("cholesky")
+    row = cholesky.compare("panel", cholesky.of_panel(6))
+    assert len(row) == len(cholesky.HEAD)
+    assert row[1:3] == [72, 2 * 6 * 5 + 36]
+    assert max(row[-2:]) < ROUND_OFF
+
+
 def test_netlist_against_pyspice_up_to_its_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     netlist = script("netlist")
     circuit = script("woven").woven_circuit(1, 1.0)
@@ -121,7 +130,7 @@ def test_network_agrees_with_ngspice() -> None:
 
 
 def test_first_run_compiles_and_the_second_does_not() -> None:
-    code = "import numpy as np\nfrom circuittex.solvers.pattern import build_pattern as b\nb(2, np.array([[0, 1]]), "
+    code = "import numpy as np\nfrom circuittex.mech.pattern import build_pattern as b\nb(2, np.array([[0, 1]]), "
     # Raises where the second run leaves more kernels than the first.
     _, _, kernels = script("compile").first_and_second(code + "np.empty((0, 2), dtype=np.int64))")
     assert kernels == 1

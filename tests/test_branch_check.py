@@ -20,14 +20,14 @@ from circuittex.command.cli import main
 from circuittex.design import Design, Loading, starter, uniaxial
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
+from circuittex.mech.linear import LinearSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation.increment import Increment
 from circuittex.relaxation.relax import Equilibrium
 from circuittex.results.bifurcation import ALLOWED, BranchCheck, Verdict
 from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.records import Record, Study
 from circuittex.results.store import load_study
-from circuittex.solvers.linear import LinearSolver
-from circuittex.solvers.multifrontal import MultifrontalSolver
 from circuittex.study.branch_check import another_order, check_branch
 from circuittex.study.plan import Step, plan
 from circuittex.study.record import reach

@@ -15,10 +15,10 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.dynamics import Rest, affine_velocity, damping_matrix, march, relax_dynamically
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.scales import fibril_scales
 from circuittex.mech.space import BeamSpace, beam_space
 from circuittex.relaxation.relax import clamp_force, force_terms, move, relax
-from circuittex.solvers.multifrontal import MultifrontalSolver
 
 E, RHO, R = 10.0, 1.0, 0.15  # MPa, g/mm3, mm
 RHO_N = 1e-6 * RHO  # N s2/mm4, since 1 N = 1e6 g mm/s2

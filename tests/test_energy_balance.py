@@ -20,6 +20,7 @@ from circuittex.design import Design, load_unload, plain_weave, shear, uniaxial
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation.increment import advance
 from circuittex.relaxation.relax import Equilibrium, move, relax
 from circuittex.results.records import Record, Study
@@ -28,7 +29,6 @@ from circuittex.results.report.number import number
 from circuittex.results.store import load_study, write_study_start
 from circuittex.results.summary import summary
 from circuittex.results.work import EnergyBalance, balance, clamp_balance, step_balances
-from circuittex.solvers.multifrontal import MultifrontalSolver
 from circuittex.study.run import run_study
 
 TOLERANCE = 1e-7  # N, largest free force

@@ -17,10 +17,10 @@ from circuittex.design import Design, Gradient, Loading, biaxial, load_unload, p
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation import increment
 from circuittex.relaxation.increment import Increment, advance
 from circuittex.relaxation.relax import Equilibrium, clamp_force, relax
-from circuittex.solvers.multifrontal import MultifrontalSolver
 
 TIGHT = 1e-8  # N
 AREA = np.pi * 0.15**2  # mm2

@@ -15,12 +15,12 @@ from circuittex.design import Design, plain_weave
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.linear import Solve
 from circuittex.mech.minimise import System, predict
+from circuittex.mech.multifrontal import MultifrontalSolver
+from circuittex.mech.pattern import Pattern
 from circuittex.mech.scales import fibril_scales
 from circuittex.relaxation.relax import Equilibrium, clamp_force, force_terms, move, relax
-from circuittex.solvers.linear import Solve
-from circuittex.solvers.multifrontal import MultifrontalSolver
-from circuittex.solvers.pattern import Pattern
 
 TIGHT = 1e-9  # N; clamp forces are some 0.1 N, so that results agree to 1e-7 and better
 AGREE = 1e-7  # of forces in N and positions in mm between runs that differ by round-off only

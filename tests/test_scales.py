@@ -15,9 +15,9 @@ from circuittex.base.binary import power_of_two
 from circuittex.contact.law import largest_penalty
 from circuittex.design import ContactLaw, MaterialPair, Numerics
 from circuittex.mech.beam import Beam
+from circuittex.mech.pattern import build_pattern
 from circuittex.mech.scales import BENDING, STRETCH, TURNING, Scales, fibril_scales
 from circuittex.mech.space import beam_space
-from circuittex.solvers.pattern import build_pattern
 
 L, R, E, SPAN = 4.0, 0.15, 10.0, 2.0
 A = pi * R**2

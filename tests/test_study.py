@@ -22,9 +22,9 @@ from circuittex.base.errors import ConvergenceError, DesignError, FolderError, S
 from circuittex.base.frozen import same
 from circuittex.base.lock import locked
 from circuittex.design import Design, equal_steps, shear, uniaxial
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.results.store import load_study
 from circuittex.results.store.archive import Digests
-from circuittex.solvers.multifrontal import MultifrontalSolver
 from circuittex.study.run import run_study
 
 STUDY = canned_study(2)

@@ -143,7 +143,7 @@ def test_a_read_only_installation_without_a_home(folder: Path, foreign: bool) ->
     take = f"--bounding-set={rights} --inh-caps={rights}" if os.getuid() == 0 else ""
     done = shell(
         folder,
-        f'setpriv {take} "$PYTHON" -W always -c "import circuittex.solvers.pattern"',
+        f'setpriv {take} "$PYTHON" -W always -c "import circuittex.mech.pattern"',
         PYTHONPATH=str(folder / "site"),
         HOME=str(folder / "home"),
         XDG_CACHE_HOME=None,

@@ -16,7 +16,7 @@ from circuittex.contact.law import pair_penalty
 from circuittex.contact.search import CONTROL_MOTION, Candidates, coupled_nodes, find_candidates
 from circuittex.design import ContactLaw
 from circuittex.geometry.mesh import FibrilMesh
-from circuittex.solvers.pattern import Pattern
+from circuittex.mech.pattern import Pattern
 
 WORTH_A_THREAD = 2000
 """Contacts that are worth a thread of their own."""

@@ -12,11 +12,11 @@ from circuittex.base.compiled import cores, side_by_side
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.kernels import N_STRAINS, beam_energy, section_force
 from circuittex.mech.material import bending_lambda, lame
+from circuittex.mech.pattern import DOFS, Pattern
 from circuittex.mech.scales import line_matrix
 from circuittex.mech.section import disk_rule
 from circuittex.mech.space import BeamSpace
 from circuittex.mech.tangent import add_tangent
-from circuittex.solvers.pattern import DOFS, Pattern
 
 WORTH_A_THREAD = 200
 """Elements whose assembly takes several times as long as it takes to start a thread."""

@@ -27,12 +27,12 @@ from circuittex.base.arrays import Floats, Ints
 from circuittex.base.errors import ConvergenceError, DesignError
 from circuittex.base.frozen import frozen
 from circuittex.mech.beam import Beam
+from circuittex.mech.linear import LinearSolver
 from circuittex.mech.minimise import minimise
+from circuittex.mech.pattern import DOFS, Pattern, multiply
 from circuittex.mech.scales import Scales
 from circuittex.mech.space import BeamSpace
 from circuittex.mech.terms import ForceTerm
-from circuittex.solvers.linear import LinearSolver
-from circuittex.solvers.pattern import DOFS, Pattern, multiply
 
 NEWTON = 1e-6
 """N in one g mm/s2: turns the mass matrix into N s2/mm."""

@@ -21,10 +21,10 @@ from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import compiled
 from circuittex.base.errors import ConvergenceError
 from circuittex.base.frozen import frozen
+from circuittex.mech.linear import LinearSolver, Solve
+from circuittex.mech.pattern import DOFS, Pattern, build_pattern, diagonal, multiply
 from circuittex.mech.scales import Scales
 from circuittex.mech.terms import ForceTerm
-from circuittex.solvers.linear import LinearSolver, Solve
-from circuittex.solvers.pattern import DOFS, Pattern, build_pattern, diagonal, multiply
 
 FIRST_SHIFT, LEAST_SHIFT = 1.0, 1e-3
 """Shifts, in parts of `Scales.metric`. The least keeps the fibrils' free spin about their axes, a true zero mode,

@@ -14,8 +14,8 @@ import numpy as np
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.binary import power_of_two
 from circuittex.base.frozen import frozen
+from circuittex.mech.pattern import DOFS, Pattern, add_elements
 from circuittex.mech.space import BeamSpace
-from circuittex.solvers.pattern import DOFS, Pattern, add_elements
 
 BENDING = 128 / 45
 """Stiffness per length that holds the positions, in parts of E I / span^4: a fibril clamped at both ends of a span has

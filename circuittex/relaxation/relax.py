@@ -14,11 +14,11 @@ from circuittex.design import Design
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.linear import LinearSolver
 from circuittex.mech.minimise import minimise
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.scales import fibril_scales
 from circuittex.mech.space import BeamSpace, beam_space
-from circuittex.solvers.linear import LinearSolver
-from circuittex.solvers.multifrontal import MultifrontalSolver
 
 
 @frozen

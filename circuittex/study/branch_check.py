@@ -20,11 +20,11 @@ from circuittex.design import Design
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.order import reordered
 from circuittex.mech.configuration import Configuration
+from circuittex.mech.linear import LinearSolver
 from circuittex.relaxation.relax import relax
 from circuittex.results.bifurcation import ALLOWED, SETTLED, BranchCheck, difference
 from circuittex.results.outcome import Outcome
 from circuittex.results.records import Record, Study
-from circuittex.solvers.linear import LinearSolver
 from circuittex.study.plan import Step, plan
 from circuittex.study.record import outcome_of, reach
 

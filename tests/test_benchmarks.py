@@ -230,7 +230,7 @@ def test_algorithm_1_comes_to_rest_in_the_equilibrium() -> None:
     (cells, seconds, sign), *others = algorithm1.marched(mesh, design, dt=1e-3, steps=500)
     assert (cells[0], sign, others) == ("Algorithm 1", "", [])
     assert seconds > 0
-    assert cells[4] <= design.numerics.tolerance
+    assert cells[4] <= design.numerics.force_tolerance
     assert cells[5] == pytest.approx(algorithm1.relax(mesh, design).energy, rel=1e-5)
 
 

@@ -111,7 +111,7 @@ def currents(design: Design, mesh: FibrilMesh, state: Equilibrium) -> Floats:
 
 @cache
 def cell() -> tuple[Design, FibrilMesh, list[Equilibrium]]:
-    design, mesh = small_cell((1, 2), elements=4, tolerance=TOLERANCE)
+    design, mesh = small_cell((1, 2), elements=4, tolerance=f"{TOLERANCE} N")
     return design, mesh, states(design, mesh, initial_configuration(mesh), MultifrontalSolver())
 
 

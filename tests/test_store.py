@@ -374,6 +374,7 @@ def test_a_file_of_version_1_is_read_with_defaults(tmp_path: Path) -> None:
     assert study.records[0].verification.simulator_failed is False
     assert study.mesh.material_names == ()
     assert study.records[0].contacts.n_contacts == 5
+    assert study.design.numerics.tolerance == "1e-06 N"  # it was a number in N
     changed = tmp_path / "changed.h5"
     changed.write_bytes(OLD.read_bytes())
     with h5py.File(changed, "r+") as file:

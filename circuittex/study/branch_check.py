@@ -109,5 +109,5 @@ def _settle(
     """
     if tolerance == 0.0:
         raise ConvergenceError("the clamps carry no force that the residual could be measured by")
-    sharp = replace(design, numerics=replace(design.numerics, tolerance=tolerance))
+    sharp = replace(design, numerics=replace(design.numerics, tolerance=f"{tolerance!r} N"))
     return outcome_of(sharp, mesh, relax(mesh, sharp, state, free=step.free, solver=solver))

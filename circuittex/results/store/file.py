@@ -141,7 +141,13 @@ def _read(path: Path) -> Study:
         for kind, members in findings.items():
             for finding in _checked(members, NAMES[kind], digest):
                 study = with_finding(study, finding)
-        return study
+        return replace(study, design=_in_newtons(study.design)) if version == 1 else study
+
+
+def _in_newtons(design: Design) -> Design:
+    """A design of a file of version 1, whose tolerance was a number in N."""
+    numerics = design.numerics
+    return replace(design, numerics=replace(numerics, tolerance=f"{numerics.tolerance!r} N"))
 
 
 def _in_order(design: Design, records: Sequence[Record]) -> tuple[Record, ...]:

@@ -9,7 +9,7 @@ from collections.abc import Hashable
 from functools import cache
 
 UNITS = (
-    *("N/(mm g)", "N mm", "N/mm2", "N/mm", "N", "MPa", "mm2", "mm3", "mm", "g/mm3", "S/mm2", "S/mm", "S", "W/(mm2 K)"),
+    *("N mm", "N/mm2", "N/mm", "N", "MPa", "mm2", "mm3", "mm", "g/mm3", "S/mm2", "S/mm", "S", "W/(mm2 K)"),
     *("W/(mm K)", "W/K", "W", "V per volt", "V per V", "V", "A", "K", "ohm", "s"),
 )
 """Units that the texts name, a longer one before those that it begins with."""

@@ -98,8 +98,9 @@ def test_the_papers_study_is_both_loadings_to_a_quarter(file: str, parameters: s
 def test_the_starter_states_the_defaults_and_the_first_example() -> None:
     design = parse_design(tomllib.loads(starter()))
     assert same(design.numerics, Numerics())
-    assert same(design.electrical, Electrical())
-    assert same(design, load_design(EXAMPLES / "plain_weave.toml"))
+    assert same(design.electrical, Electrical(fit="all-pairs"))
+    own = dataclasses.replace(design, electrical=Electrical())
+    assert same(own, load_design(EXAMPLES / "plain_weave.toml"))
 
 
 def test_the_starter_mentions_every_key() -> None:

@@ -46,6 +46,19 @@ class Electrical:
     )
     """Whether the Joule heat of the contacts warms the fibrils, half to each side."""
 
+    fit: str = field(
+        default="auto",
+        metadata=choice(
+            'what the reduced network is fitted to. "all-pairs": the resistances between all yarn ends, with one for '
+            'each crossing; "probes": the probe currents, one Ry and one Rc (the paper\'s fit); "auto": the probes '
+            "where all yarns are of one kind, else all pairs",
+            ("auto", "probes", "all-pairs"),
+            shown="all-pairs",
+        ),
+    )
+    """'auto' or 'probes': Ry and Rc are fitted to the probe currents, one of each (the paper's fit [47]); 'all-pairs',
+    or 'auto' where yarns of several kinds conduct: to the resistances between all yarn ends, crossing by crossing."""
+
     def __post_init__(self) -> None:
         check(self, "electrical")
 

@@ -22,7 +22,15 @@ from circuittex.results.report.errors import error_section
 from circuittex.results.report.number import number as _number
 from circuittex.results.report.parameters import parameters
 from circuittex.results.report.template import render, table
-from circuittex.results.summary import agrees, confirmed, difference, effort, insulated_resistance, ngspice_statement
+from circuittex.results.summary import (
+    agrees,
+    confirmed,
+    difference,
+    effort,
+    insulated_resistance,
+    network_statement,
+    ngspice_statement,
+)
 from circuittex.results.verification import AGREEMENT
 
 
@@ -152,6 +160,7 @@ def _network(study: Study) -> Markup:
         head=["state", "Ry (Ω)", "Rc (Ω)", "misfit", "warnings"],
         rows=rows,
         weighting=study.records[0].fit.weighting,
+        sentences=network_statement(study),
         insulated=_number(insulated_resistance(study.mesh)),
     )
 

@@ -29,7 +29,7 @@ def grid_currents(Ry, Rc):
 
 
 @settings(max_examples=25)
-@given(st.floats(-3.0, 3.0), st.floats(-1.0, 6.0))
+@given(st.floats(-3.0, 3.0), st.floats(0.0, 6.0))
 def test_values_are_recovered_from_synthetic_grids(log_ry, log_ratio):
     Ry, Rc = 10.0**log_ry, 10.0 ** (log_ry + log_ratio)
     fit = fit_network(grid_currents(Ry, Rc), DESIGN)

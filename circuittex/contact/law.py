@@ -12,6 +12,14 @@ def effective_modulus(e1: Floats, nu1: Floats, e2: Floats, nu2: Floats) -> Float
     return 1 / ((1 - nu1**2) / e1 + (1 - nu2**2) / e2)
 
 
+def hertz_penalty(modulus: Floats) -> Floats:
+    """P* = E*/2, N/mm2: with it two equal cylinders that cross at 90 degrees press one another as in Hertz's theory.
+
+    Both give F = 4/3 E* sqrt(R) o^(3/2) to the leading order in o / R (`docs/model.md`).
+    """
+    return modulus / 2
+
+
 def effective_radius(r1: Floats, r2: Floats) -> Floats:
     """R*, mm: 1/R* = 1/R1 + 1/R2."""
     return 1 / (1 / r1 + 1 / r2)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats, Ints
-from circuittex.base.errors import ConvergenceError
+from circuittex.base.errors import ConvergenceError, PenetrationError
 from circuittex.base.frozen import frozen
 from circuittex.mech.terms import ForceTerm
 from circuittex.solvers.linear import LinearSolver, Solve
@@ -107,6 +107,9 @@ class System:
     def energy(self, q: Floats) -> float:
         return sum(term.energy(q) for term in self.terms)
 
+    def longest(self, q: Floats, direction: Floats) -> float:
+        return min(term.longest(q, direction) for term in self.terms)
+
 
 def minimise(
     terms: Sequence[ForceTerm],
@@ -178,8 +181,13 @@ def predict(system: System, solver: LinearSolver, q: Floats, moved: Floats) -> F
     """Where a minimum q (n_dofs,) goes to first order when its prescribed unknowns move to those of `moved`.
 
     With the tangent K at q and the free unknowns f, the minimum moves by dq with (K dq)_f = 0; this is solved for the
-    difference to `moved`, a first guess. `moved` itself is returned where its potential is the lower one.
+    difference to `moved`, a first guess. `moved` itself is returned where its potential is the lower one, or where the
+    way to the prediction is barred (`ForceTerm.longest`).
+
+    Raises `PenetrationError` where the way to `moved` is barred too.
     """
+    if system.longest(q, moved - q) < 1.0:
+        raise PenetrationError("the motion of the clamps would carry fibrils through one another")
     pattern, _, _ = system.assemble(q)
     force = multiply(pattern, system.data + system.softening, moved - q)
     force[system.fixed] = 0.0
@@ -187,7 +195,8 @@ def predict(system: System, solver: LinearSolver, q: Floats, moved: Floats) -> F
     if solve is None:
         return moved
     predicted = moved - solve(force)
-    return predicted if system.energy(predicted) < system.energy(moved) else moved
+    lower = system.energy(predicted) < system.energy(moved)
+    return predicted if lower and system.longest(q, predicted - q) == 1.0 else moved
 
 
 def _positive(
@@ -227,14 +236,16 @@ def _escape(
     for sense in (-1.0, 1.0):
         step = FIRST_ESCAPE
         while (trial := system.energy(q + sense * step * mode)) < lowest:
+            if system.longest(q, sense * step * mode) < 1.0:
+                break
             best, lowest = q + sense * step * mode, trial
             step *= 2
     return best
 
 
 def _search(system: System, q: Floats, direction: Floats, energy: float, slope: float) -> float:
-    """Step length in {1, 1/2, 1/4, ...} that lowers the potential enough; 0 if none does."""
-    step = 1.0
+    """Step length in {1, 1/2, 1/4, ...} of the longest that is safe that lowers the potential enough; 0 if none does."""
+    step = system.longest(q, direction)
     for _ in range(12):
         trial = system.energy(q + step * direction)
         if trial <= energy + ARMIJO * step * slope + ROUND_OFF * abs(energy):

@@ -1,0 +1,223 @@
+"""How far a motion may go before two fibrils pass through one another: continuous collision detection of centre lines.
+
+Contact sees where fibrils overlap at the end of a step and nothing of the way there. Here the centre lines are taken
+as `CHORDS` chords of each interval of the contact curve, whose points move on straight lines while q goes to
+q + dq. Their distance d(t) is bounded below from any time on, since it changes at most as fast as the ends of the
+chords move against one another: with L the largest of those relative motions, d(t + s) >= d(t) - L s. Stepping by that
+bound (conservative advancement: Mirtich, PhD thesis, Berkeley 1996) never leaps over a collision.
+
+Two chords *collide* when their distance falls below `COLLISION` of the one they had, or of R + R' where they started
+further apart than touch. A motion without collision is not limited at all; one with a collision may go to where the
+distance is about `KEPT` of that.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from circuittex.base.arrays import Floats
+from circuittex.base.compiled import compiled
+from circuittex.base.frozen import frozen
+from circuittex.contact.curve import BASIS, CurveTable
+from circuittex.contact.law import effective_modulus, hertz_penalty
+from circuittex.geometry.mesh import FibrilMesh
+
+CHORDS = 4
+"""Chords of an interval: they leave the curve by a sixteenth of what the chord of the whole interval does."""
+COLLISION = 1 / 16
+"""Part of the first distance, or of R + R' if that is less, at which two centre lines count as having met."""
+KEPT = 1 / 2
+"""Part of it that a limited step keeps, but for `SLACK`."""
+SLACK = 1 / 16
+"""How close to `KEPT` the advancement comes, in parts of the same: it would never end at the place itself."""
+MOST_ADVANCES = 200
+"""Advances before a pair is given up as not decided: its motion is limited to where it is known to be safe. Chords that
+slide past one another at a distance just above `KEPT` take the longest, some 16 L over that distance."""
+SOFT = 0.5
+"""A penalty below this part of that of Hertz's theory is a likely cause."""
+PRESSED = 1 / 50
+"""Part of R + R' below which centre lines that still approach one another are not kept apart by contact any more."""
+
+
+@frozen
+class SafeStep:
+    """The part of a motion that is safe, and the pair of fibrils that limits it."""
+
+    part: float
+    """From 0 to 1; 1: no two fibrils collide."""
+    fibrils: tuple[int, int]
+    """The pair that limits it, the lower number first; meaningless where `part` is 1."""
+    distance: float
+    """The distance at the start of the chords of that pair that collide, mm."""
+
+
+def chords(table: CurveTable, r: Floats) -> Floats:
+    """(I, CHORDS + 1, 3) the points between the chords of every interval; r (N, 3) nodes."""
+    t = np.linspace(0.0, 1.0, CHORDS + 1)
+    weights = np.einsum("kap,tp->kta", BASIS, t[:, None] ** np.arange(4))
+    return np.asarray(np.einsum("ita,iac->itc", weights[table.kind], r[table.window[:, None] + np.arange(4)]))
+
+
+def safe_step(table: CurveTable, radius: Floats, r: Floats, motion: Floats) -> SafeStep:
+    """How much of `motion` (N, 3) the nodes r (N, 3) can make before two different fibrils collide; radius (F,), mm.
+
+    The order of the fibrils does not matter: every pair is followed to the end.
+
+    >>> from circuittex.contact.curve import CurveTable
+    >>> t = np.linspace(-1.0, 1.0, 4)[:, None]
+    >>> r = np.vstack([t * [1.0, 0.0, 0.0], t * [0.0, 1.0, 0.0] + [0.0, 0.0, 0.5]])
+    >>> table = CurveTable(np.array([0, 3, 6]), np.repeat([0, 1], 3), np.repeat([0, 4], 3), np.array([0, 1, 2] * 2))
+    >>> down = np.repeat([[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]], 4, axis=0)
+    >>> safe_step(table, np.array([0.3, 0.3]), r, down).part  # the distance of 0.5 would be 0 at a half
+    0.25
+    >>> safe_step(table, np.array([0.3, 0.3]), r, -down).part
+    1.0
+    """
+    start, way = chords(table, r), chords(table, motion)
+    end = start + way
+    reach = COLLISION * radius[table.fibril][:, None]
+    low = np.minimum(start, end).min(axis=1) - reach
+    high = np.maximum(start, end).max(axis=1) + reach
+    axis = int(np.argmax(np.ptp(low, axis=0)))
+    order = np.argsort(low[:, axis], kind="stable")
+    found = np.array([1.0, 0.0, 0.0, np.inf])
+    _sweep(order, axis, low, high, table.fibril, radius, start, way, found)
+    pair = sorted((int(found[1]), int(found[2])))
+    return SafeStep(float(found[0]), (pair[0], pair[1]), float(found[3]))
+
+
+def likely_cause(mesh: FibrilMesh, first: int, second: int, penalty: float) -> str:
+    """Why contact with the penalty P* (N/mm2) does not keep two fibrils apart, as the rest of a sentence."""
+    e, nu = mesh.youngs_modulus, mesh.poisson_ratio
+    hertz = float(hertz_penalty(effective_modulus(e[first], nu[first], e[second], nu[second])))
+    if penalty < SOFT * hertz:
+        return f"the penalty of {penalty:.3g} N/mm2 is too soft for them: Hertz's theory gives {hertz:.3g} N/mm2"
+    return "they are pressed together further than contact can hold: load them less, or in smaller steps"
+
+
+@compiled
+def segment_distance(p: Any, q: Any, r: Any, s: Any) -> float:
+    """Smallest distance of the segments from p to q and from r to s; all (3,).
+
+    The closest points of the lines, clamped to one segment, then to the other (Ericson, Real-Time Collision
+    Detection, 5.1.9).
+    """
+    uu, vv, uv, uw, vw = 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(3):
+        u, v, w = q[k] - p[k], s[k] - r[k], p[k] - r[k]
+        uu += u * u
+        vv += v * v
+        uv += u * v
+        uw += u * w
+        vw += v * w
+    determinant = uu * vv - uv * uv
+    a = 0.0
+    if determinant > 1e-12 * uu * vv:
+        a = min(1.0, max(0.0, (uv * vw - uw * vv) / determinant))
+    b = (uv * a + vw) / vv if vv > 0.0 else 0.0
+    if b < 0.0 or b > 1.0:
+        b = min(1.0, max(0.0, b))
+        a = min(1.0, max(0.0, (uv * b - uw) / uu)) if uu > 0.0 else 0.0
+    total = 0.0
+    for k in range(3):
+        d = p[k] + a * (q[k] - p[k]) - r[k] - b * (s[k] - r[k])
+        total += d * d
+    return np.sqrt(total)
+
+
+@compiled
+def _distance_at(t: float, p: Any, u: Any, q: Any, v: Any, work: Any) -> float:
+    """Distance of chords p and q (2, 3) after the part t of their motions u and v; work (4, 3)."""
+    for e in range(2):
+        for k in range(3):
+            work[e, k] = p[e, k] + t * u[e, k]
+            work[2 + e, k] = q[e, k] + t * v[e, k]
+    return segment_distance(work[0], work[1], work[2], work[3])
+
+
+@compiled
+def _relative_motion(u: Any, v: Any) -> float:
+    """Largest motion of a point of one chord against a point of the other: that of two ends, since it is bilinear."""
+    largest = 0.0
+    for i in range(2):
+        for j in range(2):
+            largest = max(largest, (u[i, 0] - v[j, 0]) ** 2 + (u[i, 1] - v[j, 1]) ** 2 + (u[i, 2] - v[j, 2]) ** 2)
+    return np.sqrt(largest)
+
+
+@compiled
+def _safe_part(p: Any, u: Any, q: Any, v: Any, touch: float, work: Any, first: Any) -> float:
+    """The safe part of the motion of two chords (`safe_step`); first (1,) receives their distance at its start."""
+    d = _distance_at(0.0, p, u, q, v, work)
+    first[0] = d
+    if d == 0.0:
+        return 0.0
+    scale, fastest = min(d, touch), _relative_motion(u, v)
+    if d - fastest > COLLISION * scale:
+        return 1.0
+    t, kept = 0.0, -1.0
+    for _ in range(MOST_ADVANCES):
+        t += (d - (KEPT if kept < 0.0 else COLLISION / 2) * scale) / fastest
+        if t >= 1.0:
+            return 1.0
+        d = _distance_at(t, p, u, q, v, work)
+        if d <= COLLISION * scale:
+            return kept
+        if kept < 0.0 and d <= (KEPT + SLACK) * scale:
+            kept = t
+    return t if kept < 0.0 else kept
+
+
+@compiled
+def _sweep(
+    order: Any, axis: int, low: Any, high: Any, fibril: Any, radius: Any, start: Any, way: Any, found: Any
+) -> None:
+    """The least safe part of all pairs of chords of different fibrils, with the pair and its distance, in found (4,).
+
+    order (I,): the intervals by the lower end along `axis` of the boxes low, high (I, 3) that they sweep.
+    """
+    work, first = np.empty((4, 3)), np.empty(1)
+    for n in range(order.shape[0]):
+        i = order[n]
+        for m in range(n + 1, order.shape[0]):
+            j = order[m]
+            if low[j, axis] > high[i, axis]:
+                break
+            if fibril[i] == fibril[j] or not _overlap(low[i], high[i], low[j], high[j]):
+                continue
+            touch = radius[fibril[i]] + radius[fibril[j]]
+            for a in range(start.shape[1] - 1):
+                for b in range(start.shape[1] - 1):
+                    p, u = start[i, a : a + 2], way[i, a : a + 2]
+                    q, v = start[j, b : b + 2], way[j, b : b + 2]
+                    if not _may_meet(p, u, q, v, COLLISION * touch):
+                        continue
+                    part = _safe_part(p, u, q, v, touch, work, first)
+                    if part < found[0]:
+                        found[0], found[1], found[2], found[3] = part, fibril[i], fibril[j], first[0]
+
+
+@compiled
+def _overlap(low: Any, high: Any, other_low: Any, other_high: Any) -> bool:
+    """Whether two boxes overlap."""
+    for k in range(3):
+        if low[k] > other_high[k] or other_low[k] > high[k]:
+            return False
+    return True
+
+
+@compiled
+def _may_meet(p: Any, u: Any, q: Any, v: Any, reach: float) -> bool:
+    """Whether the boxes that two chords sweep come within `reach`."""
+    for k in range(3):
+        low = min(min(p[0, k], p[1, k]), min(p[0, k] + u[0, k], p[1, k] + u[1, k]))
+        high = max(max(p[0, k], p[1, k]), max(p[0, k] + u[0, k], p[1, k] + u[1, k]))
+        other = min(min(q[0, k], q[1, k]), min(q[0, k] + v[0, k], q[1, k] + v[1, k]))
+        if other > high + reach:
+            return False
+        other = max(max(q[0, k], q[1, k]), max(q[0, k] + v[0, k], q[1, k] + v[1, k]))
+        if other < low - reach:
+            return False
+    return True

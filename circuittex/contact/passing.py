@@ -32,6 +32,8 @@ KEPT = 1 / 2
 """Part of it that a limited step keeps, but for `SLACK`."""
 SLACK = 1 / 16
 """How close to `KEPT` the advancement comes, in parts of the same: it would never end at the place itself."""
+UNDEFINED = 1e-9
+"""Part of R + R' below which two centre lines have no sides: only a start that no design has gets there."""
 MOST_ADVANCES = 200
 """Advances before a pair is given up as not decided: its motion is limited to where it is known to be safe. Chords that
 slide past one another at a distance just above `KEPT` take the longest, some 16 L over that distance."""
@@ -75,17 +77,26 @@ def safe_step(table: CurveTable, radius: Floats, r: Floats, motion: Floats) -> S
     >>> safe_step(table, np.array([0.3, 0.3]), r, -down).part
     1.0
     """
-    start, way = chords(table, r), chords(table, motion)
+    start, way = (_run_on(table, chords(table, x)) for x in (r, motion))
     end = start + way
-    reach = COLLISION * radius[table.fibril][:, None]
+    fibril = np.concatenate([table.fibril, *[np.arange(len(radius))] * 2])
+    reach = COLLISION * radius[fibril][:, None]
     low = np.minimum(start, end).min(axis=1) - reach
     high = np.maximum(start, end).max(axis=1) + reach
     axis = int(np.argmax(np.ptp(low, axis=0)))
     order = np.argsort(low[:, axis], kind="stable")
     found = np.array([1.0, 0.0, 0.0, np.inf])
-    _sweep(order, axis, low, high, table.fibril, radius, start, way, found)
-    pair = sorted((int(found[1]), int(found[2])))
+    _sweep(order, axis, low, high, fibril, radius, start, way, found)
+    pair = sorted(found[1:3].astype(int).tolist())
     return SafeStep(float(found[0]), (pair[0], pair[1]), float(found[3]))
+
+
+def _run_on(table: CurveTable, points: Floats) -> Floats:
+    """The chords of all intervals, then those of every fibril's minus end and of its plus end, run on by its length."""
+    minus, plus = points[table.first_interval[:-1], 0], points[table.first_interval[1:] - 1, -1]
+    t = np.linspace(0.0, 1.0, CHORDS + 1)[:, None]
+    beyond = t * (plus - minus)[:, None]
+    return np.concatenate([points, minus[:, None] - beyond, plus[:, None] + beyond])
 
 
 def likely_cause(mesh: FibrilMesh, first: int, second: int, penalty: float) -> str:
@@ -124,7 +135,7 @@ def segment_distance(p: Any, q: Any, r: Any, s: Any) -> float:
     for k in range(3):
         d = p[k] + a * (q[k] - p[k]) - r[k] - b * (s[k] - r[k])
         total += d * d
-    return np.sqrt(total)
+    return float(np.sqrt(total))
 
 
 @compiled
@@ -144,7 +155,7 @@ def _relative_motion(u: Any, v: Any) -> float:
     for i in range(2):
         for j in range(2):
             largest = max(largest, (u[i, 0] - v[j, 0]) ** 2 + (u[i, 1] - v[j, 1]) ** 2 + (u[i, 2] - v[j, 2]) ** 2)
-    return np.sqrt(largest)
+    return float(np.sqrt(largest))
 
 
 @compiled
@@ -152,8 +163,8 @@ def _safe_part(p: Any, u: Any, q: Any, v: Any, touch: float, work: Any, first: A
     """The safe part of the motion of two chords (`safe_step`); first (1,) receives their distance at its start."""
     d = _distance_at(0.0, p, u, q, v, work)
     first[0] = d
-    if d == 0.0:
-        return 0.0
+    if d <= UNDEFINED * touch:
+        return 1.0
     scale, fastest = min(d, touch), _relative_motion(u, v)
     if d - fastest > COLLISION * scale:
         return 1.0
@@ -202,10 +213,10 @@ def _sweep(
 @compiled
 def _overlap(low: Any, high: Any, other_low: Any, other_high: Any) -> bool:
     """Whether two boxes overlap."""
+    apart = False
     for k in range(3):
-        if low[k] > other_high[k] or other_low[k] > high[k]:
-            return False
-    return True
+        apart |= low[k] > other_high[k] or other_low[k] > high[k]
+    return not apart
 
 
 @compiled

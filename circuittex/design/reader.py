@@ -39,7 +39,14 @@ _MATERIAL_UNITS = {
     "thermal_conductivity": "W/(mm K)",
 }
 _CONTACT_UNITS = {"penalty": "N/mm2", "conductivity": "S/mm2", "heat_transfer": "W/(mm2 K)"}
-_NUMERICS_UNITS = {"tolerance": "N", "merge_length": "mm", "snap_length": "mm", "drop_fraction": "1"}
+_NUMERICS_UNITS = {
+    "tolerance": "N",
+    "overlap_warning": "1",
+    "overlap_limit": "1",
+    "merge_length": "mm",
+    "snap_length": "mm",
+    "drop_fraction": "1",
+}
 _PACKING_UNITS = {"lateral": "mm", "vertical": "mm", "twist": "1/mm", "phase": "mm"}
 _LOADING_KEYS = {
     "uniaxial": ("strain", "steps", "strains", "axis", "unload", "free"),

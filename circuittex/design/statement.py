@@ -58,6 +58,11 @@ class Numerics:
     """Largest free force at equilibrium, N."""
     max_iterations: int = 200
     """Newton iterations before a relaxation is given up; an increment of a loading path is then made in halves."""
+    overlap_warning: float = 0.3
+    """Overlap of two fibrils over R + R' from which on a state comes with a warning: the law of contact is for small
+    ones."""
+    overlap_limit: float = 0.5
+    """Overlap over R + R' from which on a state is not recorded: the law of contact means nothing there."""
     merge_length: float = 1.0
     """Contacts of a fibril pair within bins of this length become one resistor in the netlists, mm; 0 keeps all. At
     most the length of the longest fibril."""
@@ -77,6 +82,8 @@ class Numerics:
             section_degree=whole(self.section_degree, f"{at}.section_degree", 6, 15),
             tolerance=real(self.tolerance, f"{at}.tolerance", "N", above=0),
             max_iterations=whole(self.max_iterations, f"{at}.max_iterations", 1, 100_000),
+            overlap_warning=real(self.overlap_warning, f"{at}.overlap_warning", above=0, at_most=self.overlap_limit),
+            overlap_limit=real(self.overlap_limit, f"{at}.overlap_limit", above=0, at_most=1),
             merge_length=real(self.merge_length, f"{at}.merge_length", "mm", at_least=0),
             snap_length=real(self.snap_length, f"{at}.snap_length", "mm", at_least=0),
             drop_fraction=real(self.drop_fraction, f"{at}.drop_fraction", at_least=0, at_most=0.5),

@@ -89,7 +89,7 @@ class FibrilMesh:
 
 
 def pair_label(mesh: FibrilMesh, first: int, second: int) -> str:
-    """What two fibrils are called in messages: for example 'fibril 2 of warp1 and fibril 1 of weft2', counted from 1."""
+    """Two fibrils in words, counted from 1: 'fibril 2 of warp1 and fibril 1 of weft2', for example."""
     labels = []
     for fibril in (first, second):
         number = int(np.count_nonzero(mesh.yarn[: fibril + 1] == mesh.yarn[fibril]))

@@ -130,7 +130,7 @@ def minimise(
     largest free force; `report` is told of every iteration.
 
     Raises `ConvergenceError`, with the history, where the tolerance is not met in `max_iterations`: an
-    unconverged state is never returned.
+    unconverged state is never returned. `PenetrationError` where a term cannot keep apart what it should.
     """
     system = System(terms, mass, fixed, len(q))
     if before is not None:
@@ -165,7 +165,10 @@ def minimise(
                 continue
         force = np.where(free, gradient, 0.0)
         direction = solve(-force)
-        step = _search(system, q, direction, energy, float(force @ direction))
+        try:
+            step = _search(system, q, direction, energy, float(force @ direction))
+        except PenetrationError as error:
+            raise PenetrationError(str(error), np.array(history)) from error
         if step == 0.0:
             shift = 16 * max(shift, FIRST_SHIFT)
             if shift > system.largest_shift:
@@ -244,7 +247,7 @@ def _escape(
 
 
 def _search(system: System, q: Floats, direction: Floats, energy: float, slope: float) -> float:
-    """Step length in {1, 1/2, 1/4, ...} of the longest that is safe that lowers the potential enough; 0 if none does."""
+    """The longest safe step, or a half, a quarter, ... of it, that lowers the potential enough; 0 if none does."""
     step = system.longest(q, direction)
     for _ in range(12):
         trial = system.energy(q + step * direction)

@@ -60,9 +60,9 @@ def advance(
             start = move(now, gradient, target)
             equilibrium = relax(mesh, design, start, before=now, free=free, solver=solver, report=report)
         except ConvergenceError as error:
-            iterations += len(error.history) - 1
+            iterations += max(0, len(error.history) - 1)
             if size == SMALLEST:
-                raise ConvergenceError(_given_up(done, gradient, error), error.history) from error
+                raise type(error)(_given_up(done, gradient, error), error.history) from error
             if say is not None:
                 say(f"{_part(done, size)} did not converge ({error}); trying it in 2 halves")
             size /= 2

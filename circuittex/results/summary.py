@@ -36,6 +36,10 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
     ``contact_points``, ``levels``
         contact points at full resolution; levels in which the fibrils of the centre warp yarn lie at its centre
         crossing
+    ``deepest_overlap``, ``largest_stress_MPa``
+        the deepest overlap of two fibrils over R + R', and the largest force of a section over its reference area
+    ``doubts``
+        why the state cannot be right or trusted, in sentences: overlaps, stresses, temperatures; empty if all is well
     ``netlist``
         path of the detailed netlist, relative to the folder of the file
     ``error_estimate``
@@ -78,6 +82,7 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results.bifurcation import BranchCheck, branch_statement, current_difference, force_difference
 from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.records import Record, Study
+from circuittex.results.soundness import deepest_overlap, doubt_statement, doubts, section_stress
 from circuittex.results.verification import AGREEMENT
 from circuittex.results.work import EnergyBalance, step_balances
 
@@ -109,10 +114,12 @@ def write_summary(path: str | Path, study: Study) -> None:
 
 
 def table(study: Study) -> str:
-    """The closing table of a run: one line for each state, with its estimated error where there is one, then what the
-    study took, what the branch checks found, and whether ngspice confirmed it. A blank line parts the loading paths."""
+    """The closing table of a run: one line for each state, with its estimated error where there is one.
+
+    After it what the study took, what the branch checks found, which states to doubt, and whether ngspice confirmed it.
+    A blank line parts the loading paths."""
     head = ["state", "Fx warp N", "Fy weft N", *(f"{probe.name} A" for probe in study.design.probes)]
-    rows = [[*head, "Ry ohm", "Rc ohm", "iterations", "routes differ"]]
+    rows = [[*head, "Ry ohm", "Rc ohm", "overlap", "iterations", "routes differ"]]
     path = ""
     for record in study.records:
         if record.path != path:
@@ -120,9 +127,11 @@ def table(study: Study) -> str:
             path = record.path
         numbers = [record.clamp_force[0, 0], record.clamp_force[1, 1], *record.currents, record.fit.Ry, record.fit.Rc]
         rows.append([record.name, *(f"{number:#.4g}" for number in numbers)])
-        rows[-1] += [str(record.iterations), f"{difference(record):.1e}"]
+        rows[-1] += [f"{deepest_overlap(record.contacts)[0]:.2f}", str(record.iterations), f"{difference(record):.1e}"]
         if (error := study.error_of(record.name)) is not None:
-            rows.append(["  estimated error", *(_percent(quantity.relative) for quantity in error.quantities), "", ""])
+            rows.append(
+                ["  estimated error", *(_percent(quantity.relative) for quantity in error.quantities), "", "", ""]
+            )
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
         "  ".join(
@@ -132,7 +141,15 @@ def table(study: Study) -> str:
     ]
     warnings = [f"Error estimate of {error.state}: {text}." for error in study.errors for text in error.warnings]
     return "\n".join(
-        [*lines, "", *effort(study), *branch_statement(study.branches), *warnings, *ngspice_statement(study)]
+        [
+            *lines,
+            "",
+            *effort(study),
+            *branch_statement(study.branches),
+            *warnings,
+            *doubt_statement(study),
+            *ngspice_statement(study),
+        ]
     )
 
 
@@ -257,6 +274,9 @@ def _state(study: Study, record: Record, step: EnergyBalance | None) -> dict[str
         "fit_warnings": record.fit.warnings,
         "contact_points": record.contacts.n_contacts,
         "levels": record.levels,
+        "deepest_overlap": deepest_overlap(record.contacts)[0],
+        "largest_stress_MPa": section_stress(record).max(),
+        "doubts": [doubt.text for doubt in doubts(study, record)],
         "netlist": record.netlist,
         "error_estimate": None if error is None else _error_estimate(error),
         "branch_check": None if check is None else _branch_check(check),

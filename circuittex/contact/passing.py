@@ -7,8 +7,7 @@ chords move against one another: with L the largest of those relative motions, d
 bound (conservative advancement: Mirtich, PhD thesis, Berkeley 1996) never leaps over a collision.
 
 Two chords *collide* when their distance falls below `COLLISION` of the one they had, or of R + R' where they started
-further apart than touch. A motion without collision is not limited at all; one with a collision may go to where the
-distance is about `KEPT` of that.
+further apart than touch. A motion without collision is not limited at all.
 """
 
 from __future__ import annotations
@@ -26,17 +25,16 @@ from circuittex.geometry.mesh import FibrilMesh
 
 CHORDS = 4
 """Chords of an interval: they leave the curve by a sixteenth of what the chord of the whole interval does."""
-COLLISION = 1 / 16
-"""Part of the first distance, or of R + R' if that is less, at which two centre lines count as having met."""
-KEPT = 1 / 2
-"""Part of it that a limited step keeps, but for `SLACK`."""
-SLACK = 1 / 16
-"""How close to `KEPT` the advancement comes, in parts of the same: it would never end at the place itself."""
+COLLISION = 1 / 4
+"""Part of the first distance, or of R + R' if that is less, at which two centre lines count as having met. It leaves
+room for the line search, which goes by energies, to come back."""
+CLOSEST = 1 / 8
+"""How close the advancement comes to the collision, in parts of it: it would never end at the place itself."""
 UNDEFINED = 1e-9
 """Part of R + R' below which two centre lines have no sides: only a start that no design has gets there."""
 MOST_ADVANCES = 200
-"""Advances before a pair is given up as not decided: its motion is limited to where it is known to be safe. Chords that
-slide past one another at a distance just above `KEPT` take the longest, some 16 L over that distance."""
+"""Advances before a pair counts as colliding, where it is known to be safe until then. Chords that slide past one
+another just outside a collision take the longest, some 32 L over their first distance."""
 SOFT = 0.5
 """A penalty below this part of that of Hertz's theory is a likely cause."""
 PRESSED = 1 / 50
@@ -72,8 +70,8 @@ def safe_step(table: CurveTable, radius: Floats, r: Floats, motion: Floats) -> S
     >>> r = np.vstack([t * [1.0, 0.0, 0.0], t * [0.0, 1.0, 0.0] + [0.0, 0.0, 0.5]])
     >>> table = CurveTable(np.array([0, 3, 6]), np.repeat([0, 1], 3), np.repeat([0, 4], 3), np.array([0, 1, 2] * 2))
     >>> down = np.repeat([[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]], 4, axis=0)
-    >>> safe_step(table, np.array([0.3, 0.3]), r, down).part  # the distance of 0.5 would be 0 at a half
-    0.25
+    >>> safe_step(table, np.array([0.3, 0.3]), r, down).part  # from 0.5 to a quarter of it
+    0.375
     >>> safe_step(table, np.array([0.3, 0.3]), r, -down).part
     1.0
     """
@@ -168,17 +166,15 @@ def _safe_part(p: Any, u: Any, q: Any, v: Any, touch: float, work: Any, first: A
     scale, fastest = min(d, touch), _relative_motion(u, v)
     if d - fastest > COLLISION * scale:
         return 1.0
-    t, kept = 0.0, -1.0
+    t = 0.0
     for _ in range(MOST_ADVANCES):
-        t += (d - (KEPT if kept < 0.0 else COLLISION / 2) * scale) / fastest
+        t += (d - COLLISION * scale) / fastest
         if t >= 1.0:
             return 1.0
         d = _distance_at(t, p, u, q, v, work)
-        if d <= COLLISION * scale:
-            return kept
-        if kept < 0.0 and d <= (KEPT + SLACK) * scale:
-            kept = t
-    return t if kept < 0.0 else kept
+        if d <= (1.0 + CLOSEST) * COLLISION * scale:
+            break
+    return t
 
 
 @compiled

@@ -247,11 +247,12 @@ def _escape(
 
 
 def _search(system: System, q: Floats, direction: Floats, energy: float, slope: float) -> float:
-    """The longest safe step, or a half, a quarter, ... of it, that lowers the potential enough; 0 if none does."""
-    step = system.longest(q, direction)
+    """Step length in {1, 1/2, 1/4, ...} that is safe and lowers the potential enough; 0 if none does."""
+    step, longest = 1.0, system.longest(q, direction)
     for _ in range(12):
-        trial = system.energy(q + step * direction)
-        if trial <= energy + ARMIJO * step * slope + ROUND_OFF * abs(energy):
-            return step
+        if step <= longest:
+            trial = system.energy(q + step * direction)
+            if trial <= energy + ARMIJO * step * slope + ROUND_OFF * abs(energy):
+                return step
         step /= 2
     return 0.0

@@ -9,6 +9,11 @@ from circuittex.design.checks import name, real, refuse, store, whole
 
 MOST_FIBRILS = 10_000
 """Fibrils of one yarn."""
+MOST_OPEN = 1e5
+"""Pitch over the smallest radius: the most open scrims of the thinnest fibrils have some 1e4."""
+STIFFEST, HEAVIEST, MOST_CONDUCTIVE, THICKEST = 1e9, 1e6, 1e9, 1e4
+"""MPa, g/mm3, S/mm and W/(mm K), mm: a thousand times and more beyond diamond, osmium, silver and a ship's rope, which
+leaves room for designs in units of another scale and none for slips of the pen."""
 
 
 @frozen
@@ -35,13 +40,19 @@ class Material:
         at = f"materials.{name(self.name, 'materials')}"
         store(
             self,
-            youngs_modulus=real(self.youngs_modulus, f"{at}.youngs_modulus", "MPa", above=0),
+            youngs_modulus=real(self.youngs_modulus, f"{at}.youngs_modulus", "MPa", above=0, at_most=STIFFEST),
             poisson_ratio=real(self.poisson_ratio, f"{at}.poisson_ratio", at_least=0, at_most=0.45),
-            density=real(self.density, f"{at}.density", "g/mm3", above=0),
+            density=real(self.density, f"{at}.density", "g/mm3", above=0, at_most=HEAVIEST),
             electrical_conductivity=real(
-                self.electrical_conductivity, f"{at}.electrical_conductivity", "S/mm", at_least=0
+                self.electrical_conductivity,
+                f"{at}.electrical_conductivity",
+                "S/mm",
+                at_least=0,
+                at_most=MOST_CONDUCTIVE,
             ),
-            thermal_conductivity=real(self.thermal_conductivity, f"{at}.thermal_conductivity", "W/(mm K)", above=0),
+            thermal_conductivity=real(
+                self.thermal_conductivity, f"{at}.thermal_conductivity", "W/(mm K)", above=0, at_most=MOST_CONDUCTIVE
+            ),
         )
 
 
@@ -78,7 +89,7 @@ class Yarn:
         store(
             self,
             rows=rows,
-            radius=real(self.radius, f"{at}.radius", "mm", above=0),
+            radius=real(self.radius, f"{at}.radius", "mm", above=0, at_most=THICKEST),
             spacing=real(self.spacing, f"{at}.spacing", "mm", above=0),
             row_spacing=real(self.row_spacing, f"{at}.row_spacing", "mm", above=0),
             materials=tuple(self.materials),
@@ -137,7 +148,27 @@ class Weave:
                 raise refuse(
                     f"weave.{which}", len(getattr(self, which)), f"the draft needs {wanted} yarns, one for each {side}"
                 )
+        self._check_proportions()
         self._check_curvature()
+
+    def _check_proportions(self) -> None:
+        # Lengths against one another, so that a design of any size is judged alike.
+        for yarn in self.yarns:
+            at = f"yarns.{yarn.name}"
+            for key in ("spacing", "row_spacing"):
+                if getattr(yarn, key) > self.pitch:
+                    allowed = f"it must be at most the pitch of the weave, {self.pitch:g} mm"
+                    raise refuse(f"{at}.{key}", getattr(yarn, key), allowed)
+            if (max(yarn.rows) - 1) * yarn.spacing > self.pitch:
+                allowed = f"a row of {max(yarn.rows)} fibrils must not be wider than the pitch, {self.pitch:g} mm"
+                raise refuse(f"{at}.spacing", yarn.spacing, allowed)
+        if self.amplitude > self.pitch:
+            allowed = f"it must be at most the pitch, {self.pitch:g} mm: no yarn is as steep"
+            raise refuse("weave.amplitude", self.amplitude, allowed)
+        radius = min(yarn.radius for yarn in self.yarns)
+        if self.pitch > MOST_OPEN * radius:
+            allowed = f"it must be at most {MOST_OPEN * radius:g} mm, {MOST_OPEN:g} of the smallest radii"
+            raise refuse("weave.pitch", self.pitch, allowed)
 
     def _check_curvature(self) -> None:
         # The section at a crest turns inside out where R >= radius of curvature = pitch^2 / (pi^2 H).

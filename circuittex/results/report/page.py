@@ -23,6 +23,7 @@ from circuittex.results.report.frame import PAGE
 from circuittex.results.report.parameters import parameters
 from circuittex.results.report.table import number as _number
 from circuittex.results.report.table import table as _table
+from circuittex.results.soundness import deepest_overlap, doubt_statement, section_stress
 from circuittex.results.summary import agrees, confirmed, difference, effort, insulated_resistance, ngspice_statement
 from circuittex.results.verification import AGREEMENT
 
@@ -89,7 +90,7 @@ def _facts(study: Study, claims: Table | None) -> str:
 
 
 def _verdict(study: Study) -> str:
-    """Whether the routes agree and ngspice took part, as a box that cannot be overlooked."""
+    """Whether the routes agree and ngspice took part, and what to doubt, as a box that cannot be overlooked."""
     if not study.records:
         return '<p class="bad">No state has been recorded: there are no results yet.</p>'
     sentences = list(ngspice_statement(study))
@@ -101,7 +102,9 @@ def _verdict(study: Study) -> str:
             f"The routes to every node voltage and probe current {'agree' if agree else 'DISAGREE'}: the largest "
             f"difference in any state is {worst:.1e} (at most {AGREEMENT:.0e} is required).",
         )
-    kind = "good" if all(confirmed(record) for record in study.records) else "bad"
+    doubtful = doubt_statement(study)
+    sentences += doubtful
+    kind = "good" if all(confirmed(record) for record in study.records) and not doubtful else "bad"
     return f'<div class="{kind}">' + "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences) + "</div>"
 
 
@@ -131,9 +134,17 @@ def _forces(study: Study) -> str:
 
 
 def _equilibrium(study: Study) -> str:
-    head = ["state", "largest free force (N)", "Newton iterations", "parts", "levels", "contact points", "netlist"]
+    head = ["state", "largest free force (N)", "Newton iterations", "parts", "levels", "contact points"]
+    head += ["deepest overlap / (R + R')", "largest stress (MPa)", "netlist"]
     rows = [
-        [r.name, f"{r.residual:.1e}", *map(str, (r.iterations, r.parts, r.levels, r.contacts.n_contacts)), r.netlist]
+        [
+            r.name,
+            f"{r.residual:.1e}",
+            *map(str, (r.iterations, r.parts, r.levels, r.contacts.n_contacts)),
+            f"{deepest_overlap(r.contacts)[0]:.2f}",
+            _number(float(section_stress(r).max())),
+            r.netlist,
+        ]
         for r in study.records
     ]
     return _table(head, rows) + "".join(f"<p>{escape(sentence)}</p>" for sentence in effort(study))

@@ -9,19 +9,27 @@ from typing import TYPE_CHECKING, Any
 from circuittex.base.version import __version__
 
 _HOMES = {
-    "design": ("Design", "design_hash", "load_design", "parse_design", "plain_weave", "starter"),
+    "design": (
+        *("ContactLaw", "Design", "Electrical", "Loading", "Material", "MaterialPair", "Numerics", "Packing"),
+        *("Probe", "Terminal", "Weave", "Yarn", "biaxial", "design_hash", "equal_steps", "load_design", "load_unload"),
+        *("parse_design", "plain_weave", "shear", "starter", "uniaxial"),
+    ),
     "geometry.weave": ("build_mesh",),
     "mech.configuration": ("initial_configuration",),
     "contact.state": ("ContactState",),
     "contact.extract": ("contact_state", "contacts_of"),
     "contact.merge": ("simplify",),
+    "contact.places": ("contact_places",),
     "electrical.fields": ("solve_fields",),
-    "electrical.network.circuit": ("Circuit", "build_circuit", "reduced_circuit", "yarn_end_terminals"),
+    "electrical.network.circuit": ("Circuit", "build_circuit", "reduced_circuit", "to_networkx", "yarn_end_terminals"),
     "electrical.network.nodal": ("solve_nodal",),
-    "netlist": ("Header", "deck", "subcircuit", "to_pyspice"),
+    "netlist": ("Header", "deck", "subcircuit", "to_pyspice", "to_pyspice_subcircuit"),
     "fit": ("fit_network",),
-    "relaxation.relax": ("relax",),
+    "relaxation.relax": ("move", "relax"),
+    "relaxation.increment": ("advance",),
     "study.run": ("run_study",),
+    "study.ensemble": ("run_ensemble",),
+    "results.plot": ("cell_figure", "probe_figure", "section_figure"),
     "results.records": ("Record", "Study"),
     "results.store": ("load_study",),
     "base.errors": ("CircuittexError", "ConvergenceError", "DesignError"),
@@ -37,17 +45,35 @@ if TYPE_CHECKING:
     from circuittex.contact.extract import contact_state as contact_state
     from circuittex.contact.extract import contacts_of as contacts_of
     from circuittex.contact.merge import simplify as simplify
+    from circuittex.contact.places import contact_places as contact_places
     from circuittex.contact.state import ContactState as ContactState
+    from circuittex.design import ContactLaw as ContactLaw
     from circuittex.design import Design as Design
+    from circuittex.design import Electrical as Electrical
+    from circuittex.design import Loading as Loading
+    from circuittex.design import Material as Material
+    from circuittex.design import MaterialPair as MaterialPair
+    from circuittex.design import Numerics as Numerics
+    from circuittex.design import Packing as Packing
+    from circuittex.design import Probe as Probe
+    from circuittex.design import Terminal as Terminal
+    from circuittex.design import Weave as Weave
+    from circuittex.design import Yarn as Yarn
+    from circuittex.design import biaxial as biaxial
     from circuittex.design import design_hash as design_hash
+    from circuittex.design import equal_steps as equal_steps
     from circuittex.design import load_design as load_design
+    from circuittex.design import load_unload as load_unload
     from circuittex.design import parse_design as parse_design
     from circuittex.design import plain_weave as plain_weave
+    from circuittex.design import shear as shear
     from circuittex.design import starter as starter
+    from circuittex.design import uniaxial as uniaxial
     from circuittex.electrical.fields import solve_fields as solve_fields
     from circuittex.electrical.network.circuit import Circuit as Circuit
     from circuittex.electrical.network.circuit import build_circuit as build_circuit
     from circuittex.electrical.network.circuit import reduced_circuit as reduced_circuit
+    from circuittex.electrical.network.circuit import to_networkx as to_networkx
     from circuittex.electrical.network.circuit import yarn_end_terminals as yarn_end_terminals
     from circuittex.electrical.network.nodal import solve_nodal as solve_nodal
     from circuittex.fit import fit_network as fit_network
@@ -57,10 +83,17 @@ if TYPE_CHECKING:
     from circuittex.netlist import deck as deck
     from circuittex.netlist import subcircuit as subcircuit
     from circuittex.netlist import to_pyspice as to_pyspice
+    from circuittex.netlist import to_pyspice_subcircuit as to_pyspice_subcircuit
+    from circuittex.relaxation.increment import advance as advance
+    from circuittex.relaxation.relax import move as move
     from circuittex.relaxation.relax import relax as relax
+    from circuittex.results.plot import cell_figure as cell_figure
+    from circuittex.results.plot import probe_figure as probe_figure
+    from circuittex.results.plot import section_figure as section_figure
     from circuittex.results.records import Record as Record
     from circuittex.results.records import Study as Study
     from circuittex.results.store import load_study as load_study
+    from circuittex.study.ensemble import run_ensemble as run_ensemble
     from circuittex.study.run import run_study as run_study
 else:
 

@@ -18,7 +18,7 @@ from circuittex.base.frozen import frozen
 from circuittex.base.version import __version__
 from circuittex.electrical.network.circuit import KINDS, Circuit, reached_part
 from circuittex.electrical.network.names import safe_name, unique_names
-from circuittex.electrical.spice.pyspice import to_pyspice
+from circuittex.electrical.spice.pyspice import to_pyspice, to_pyspice_subcircuit
 from circuittex.electrical.spice.reader import parse
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "pin_names",
     "subcircuit",
     "to_pyspice",
+    "to_pyspice_subcircuit",
 ]
 
 _LINE = 100

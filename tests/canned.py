@@ -59,7 +59,7 @@ class Canned:
 
     def install(self, monkeypatch: pytest.MonkeyPatch) -> Canned:
         """Take the place of the computations and of the report, whose drawing takes long."""
-        for module in ("study", "schedule"):
+        for module in ("study.run", "study.schedule"):
             monkeypatch.setattr(f"circuittex.{module}.reach", self.reach)
         monkeypatch.setattr("circuittex.study.schedule.record_state", self.record_state)
         monkeypatch.setattr("circuittex.study.folder.write_report", report)
@@ -80,7 +80,7 @@ def files(folder: Path) -> set[str]:
     return {
         path.relative_to(folder).as_posix()
         for path in folder.rglob("*")
-        if path.is_file() and path.name != ".circuittex.base.lock"
+        if path.is_file() and path.name != ".circuittex.lock"
     }
 
 

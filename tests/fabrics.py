@@ -11,7 +11,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.contact.penalty import PenaltyContact
-from circuittex.design import Design, plain_weave
+from circuittex.design import ContactLaw, Design, plain_weave
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.order import reordered
 from circuittex.geometry.weave import build_mesh
@@ -158,7 +158,7 @@ def contact_term(
 ) -> tuple[PenaltyContact, Floats]:
     """The contact term of a mesh and the vector of unknowns of its initial configuration."""
     space = beam_space(mesh)
-    term = PenaltyContact(mesh, penalty=penalty, per_element=per_element, skin=skin)
+    term = PenaltyContact(mesh, law=ContactLaw(penalty, 0.0, 0.0), per_element=per_element, skin=skin)
     return term, space.vector(initial_configuration(mesh))
 
 

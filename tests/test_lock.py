@@ -53,4 +53,4 @@ def test_a_failure_inside_releases_it(tmp_path: Path) -> None:
     with pytest.raises(ZeroDivisionError), locked(tmp_path):
         raise ZeroDivisionError
     with locked(tmp_path):
-        assert {path.name for path in tmp_path.iterdir()} == {".circuittex.base.lock", ".circuittex.holder"}
+        assert {path.name for path in tmp_path.iterdir()} == {".circuittex.lock", ".circuittex.holder"}

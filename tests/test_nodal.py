@@ -271,3 +271,13 @@ def test_two_driven_ports_on_one_node():
     circuit = replace(network([(0, 1, 1.0)], [0, 1]), port_node=np.array([0, 0]))
     with pytest.raises(CircuitError, match="the same node"):
         solve_nodal(circuit, {"p0": 1.0, "p1": 0.0})
+
+
+@pytest.mark.parametrize("ohm", [-1.0, -5.0, 0.0, np.nan, np.inf, -np.inf])
+def test_a_resistance_that_is_none_is_refused_by_name(ohm):
+    """Negative ones gave currents of 0.2 and 1.0 A, zero and infinity nan, and nan an error of SciPy's."""
+    good = reduced_circuit((1, 1), 2.0, 5.0)
+    resistance = good.resistance.copy()
+    resistance[1] = ohm
+    with pytest.raises(CircuitError, match=f"resistor '{good.resistor_names[1]}': {ohm!r} ohm is not usable"):
+        solve_nodal(replace(good, resistance=resistance), {"warp1_minus": 1.0, "weft1_plus": 0.0})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 T = TypeVar("T")
 
 
-@dataclass_transform(frozen_default=True, eq_default=False)
+@dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(field,))
 def frozen(cls: type[T]) -> type[T]:
     """Make `cls` a frozen dataclass whose array fields are read-only copies.
 
@@ -27,12 +27,12 @@ def frozen(cls: type[T]) -> type[T]:
     inner = getattr(cls, "__post_init__", None)
 
     def lock(self: Any) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for each in fields(self):
+            value = getattr(self, each.name)
             if isinstance(value, np.ndarray) and value.flags.writeable:
                 locked = value.copy()
                 locked.setflags(write=False)
-                object.__setattr__(self, field.name, locked)
+                object.__setattr__(self, each.name, locked)
         if inner is not None:
             inner(self)
 

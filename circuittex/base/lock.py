@@ -13,7 +13,7 @@ from filelock import FileLock, Timeout
 
 from circuittex.base.errors import FolderError
 
-LOCK = ".circuittex.base.lock"
+LOCK = ".circuittex.lock"
 """The file that is locked; it stays when the lock is released, since to remove it would let two in at once."""
 HOLDER = ".circuittex.holder"
 """Tells who holds the lock, for the message to others; the lock does not depend on it."""
@@ -28,7 +28,7 @@ def locked(folder: str | Path) -> Iterator[None]:
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder, locked(folder):
     ...     sorted(path.name for path in Path(folder).iterdir())
-    ['.circuittex.holder', '.circuittex.base.lock']
+    ['.circuittex.holder', '.circuittex.lock']
     """
     folder = Path(folder)
     lock, holder = FileLock(folder / LOCK), folder / HOLDER

@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from circuittex.base.arrays import Floats
-from circuittex.contact.law import effective_modulus, effective_radius, hertz_width
+from circuittex.contact.law import (
+    effective_modulus,
+    effective_radius,
+    hertz_width,
+    pair_conductivity,
+    pair_heat_transfer,
+    pair_penalty,
+)
 from circuittex.contact.penalty import PenaltyContact
 from circuittex.contact.state import ContactState
 from circuittex.design import ContactLaw, Design
@@ -22,24 +29,22 @@ def contact_state(
     per_element: int,
     conduction: str = "reference",
 ) -> ContactState:
-    """The contact points of a configuration with their loads, Hertz widths and conductances.
+    """The contact points of a configuration with their loads, Hertz half-widths and conductances.
 
     p = P* o [28], a = sqrt(4 R* p / (pi E*)) [29], G = sigma_c a w [31] (0 where either fibril insulates),
     heat conductance h_c a w [30]. `per_element` contact points an element; `conduction` is 'reference' or
     'current' (`axial_factor`).
     """
     space = beam_space(mesh)
-    term = PenaltyContact(mesh, penalty=law.penalty, per_element=per_element)
+    term = PenaltyContact(mesh, law=law, per_element=per_element)
     touching, table = term.touching(space.vector(configuration)), term.table
     a, b = table.fibril[touching.interval_a], touching.fibril_b
     spacing = mesh.length / (np.diff(mesh.first_node) - 1)
-    load = law.penalty * touching.overlap
+    load = pair_penalty(mesh, law, a, b) * touching.overlap
     e, nu = mesh.youngs_modulus, mesh.poisson_ratio
     radius = effective_radius(mesh.radius[a], mesh.radius[b])
     width = hertz_width(load, radius, effective_modulus(e[a], nu[a], e[b], nu[b]))
     weight = term.weight[a]
-    sigma = mesh.electrical_conductivity
-    conducts = (sigma[a] > 0) & (sigma[b] > 0)
     return ContactState(
         mesh=mesh,
         fibril_a=a,
@@ -50,8 +55,8 @@ def contact_state(
         line_load=load,
         width=width,
         weight=weight,
-        conductance=np.where(conducts, law.conductivity * width * weight, 0.0),
-        heat_conductance=law.heat_transfer * width * weight,
+        conductance=pair_conductivity(mesh, law, a, b) * width * weight,
+        heat_conductance=pair_heat_transfer(mesh, law, a, b) * width * weight,
         axial_factor=axial_factor(space, configuration) if conduction == "current" else np.ones(len(mesh.elements)),
     )
 

@@ -1,10 +1,12 @@
-"""Contact laws: Hertz width of two parallel cylinders [29]."""
+"""Contact laws: the penalty of a pair of fibrils, the Hertz half-width [29], and what differs from pair to pair."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from circuittex.base.arrays import Floats
+from circuittex.base.arrays import Floats, Ints
+from circuittex.design import HERTZ, ContactLaw
+from circuittex.geometry.mesh import FibrilMesh
 
 
 def effective_modulus(e1: Floats, nu1: Floats, e2: Floats, nu2: Floats) -> Floats:
@@ -13,9 +15,11 @@ def effective_modulus(e1: Floats, nu1: Floats, e2: Floats, nu2: Floats) -> Float
 
 
 def hertz_penalty(modulus: Floats) -> Floats:
-    """P* = E*/2, N/mm2: with it two equal cylinders that cross at 90 degrees press one another as in Hertz's theory.
+    """P* = E*/2, N/mm2.
 
-    Both give F = 4/3 E* sqrt(R) o^(3/2) to the leading order in o / R (`docs/model.md`).
+    A line load P* o on either of two crossing cylinders of equal radius R, integrated over the crossing, is
+    8/3 P* sqrt(R) o^(3/2), and Hertz's point contact has 4/3 E* sqrt(R) o^(3/2) (Johnson, Contact Mechanics, 1985,
+    section 4.2).
     """
     return modulus / 2
 
@@ -26,13 +30,46 @@ def effective_radius(r1: Floats, r2: Floats) -> Floats:
 
 
 def hertz_width(line_load: Floats, radius: Floats, modulus: Floats) -> Floats:
-    """Contact width a = sqrt(4 R* p / (pi E*)) [29], mm, for a line load p in N/mm.
+    """Contact half-width a = sqrt(4 R* p / (pi E*)) [29], mm, for a line load p in N/mm.
 
-    This is what the paper calls the differential thickness of the contact; in Hertz's theory it is the
-    half-width of the strip.
+    The paper calls it the differential thickness of the contact and uses it as the width; in Hertz's theory the strip
+    is twice as wide.
 
     >>> import numpy as np
     >>> float(hertz_width(np.array(np.pi), np.array(1.0), np.array(4.0)))
     1.0
     """
     return np.asarray(np.sqrt(4 * radius * line_load / (np.pi * modulus)))
+
+
+def pair_penalty(mesh: FibrilMesh, law: ContactLaw, a: Ints, b: Ints) -> Floats:
+    """P* (C,), N/mm2, of contacts between the fibrils a and b (C,); 'hertz' is that of `hertz_penalty`."""
+    stated = _of_pairs(mesh, law, "penalty", a, b)
+    e, nu = mesh.youngs_modulus, mesh.poisson_ratio
+    return np.where(np.isnan(stated), hertz_penalty(effective_modulus(e[a], nu[a], e[b], nu[b])), stated)
+
+
+def pair_conductivity(mesh: FibrilMesh, law: ContactLaw, a: Ints, b: Ints) -> Floats:
+    """sigma_c (C,), S/mm2, of contacts between the fibrils a and b (C,); 0 where either of them insulates."""
+    conducts = (mesh.electrical_conductivity[a] > 0) & (mesh.electrical_conductivity[b] > 0)
+    return np.where(conducts, _of_pairs(mesh, law, "conductivity", a, b), 0.0)
+
+
+def pair_heat_transfer(mesh: FibrilMesh, law: ContactLaw, a: Ints, b: Ints) -> Floats:
+    """h_c (C,), W/(mm2 K), of contacts between the fibrils a and b (C,)."""
+    return _of_pairs(mesh, law, "heat_transfer", a, b)
+
+
+def _of_pairs(mesh: FibrilMesh, law: ContactLaw, name: str, a: Ints, b: Ints) -> Floats:
+    """(C,) a property of the contact between the fibrils' materials; nan for the word 'hertz'."""
+    table = np.full((max(1, len(mesh.material_names)),) * 2, _value(getattr(law, name)))
+    for i, one in enumerate(mesh.material_names):
+        for j, other in enumerate(mesh.material_names):
+            table[i, j] = _value(getattr(law.between(one, other), name))
+    if not len(mesh.material):
+        return np.full(len(a), table[0, 0])
+    return np.asarray(table[mesh.material[a], mesh.material[b]])
+
+
+def _value(stated: float | str) -> float:
+    return np.nan if stated == HERTZ else float(stated)

@@ -20,7 +20,8 @@ from circuittex.base.arrays import Floats
 from circuittex.base.compiled import compiled
 from circuittex.base.frozen import frozen
 from circuittex.contact.curve import BASIS, CurveTable
-from circuittex.contact.law import effective_modulus, hertz_penalty
+from circuittex.contact.law import effective_modulus, hertz_penalty, pair_penalty
+from circuittex.design import ContactLaw
 from circuittex.geometry.mesh import FibrilMesh
 
 CHORDS = 4
@@ -30,8 +31,6 @@ COLLISION = 1 / 4
 room for the line search, which goes by energies, to come back."""
 CLOSEST = 1 / 8
 """How close the advancement comes to the collision, in parts of it: it would never end at the place itself."""
-UNDEFINED = 1e-9
-"""Part of R + R' below which two centre lines have no sides: only a start that no design has gets there."""
 MOST_ADVANCES = 200
 """Advances before a pair counts as colliding, where it is known to be safe until then. Chords that slide past one
 another just outside a collision take the longest, some 32 L over their first distance."""
@@ -97,12 +96,17 @@ def _run_on(table: CurveTable, points: Floats) -> Floats:
     return np.concatenate([points, minus[:, None] - beyond, plus[:, None] + beyond])
 
 
-def likely_cause(mesh: FibrilMesh, first: int, second: int, penalty: float) -> str:
-    """Why contact with the penalty P* (N/mm2) does not keep two fibrils apart, as the rest of a sentence."""
+def likely_cause(mesh: FibrilMesh, law: ContactLaw, first: int, second: int) -> str:
+    """Why contact by a law does not keep two fibrils apart, as the rest of a sentence."""
+    one, other = np.array([first]), np.array([second])
     e, nu = mesh.youngs_modulus, mesh.poisson_ratio
-    hertz = float(hertz_penalty(effective_modulus(e[first], nu[first], e[second], nu[second])))
+    penalty = float(pair_penalty(mesh, law, one, other)[0])
+    hertz = float(hertz_penalty(effective_modulus(e[one], nu[one], e[other], nu[other]))[0])
     if penalty < SOFT * hertz:
-        return f"the penalty of {penalty:.3g} N/mm2 is too soft for them: Hertz's theory gives {hertz:.3g} N/mm2"
+        return (
+            f"the penalty of {penalty:.3g} N/mm2 is too soft for them: Hertz's theory gives {hertz:.3g} N/mm2, "
+            'which penalty = "hertz" asks for'
+        )
     return "they are pressed together further than contact can hold: load them less, or in smaller steps"
 
 
@@ -161,10 +165,8 @@ def _safe_part(p: Any, u: Any, q: Any, v: Any, touch: float, work: Any, first: A
     """The safe part of the motion of two chords (`safe_step`); first (1,) receives their distance at its start."""
     d = _distance_at(0.0, p, u, q, v, work)
     first[0] = d
-    if d <= UNDEFINED * touch:
-        return 1.0
     scale, fastest = min(d, touch), _relative_motion(u, v)
-    if d - fastest > COLLISION * scale:
+    if fastest == 0.0 or d - fastest > COLLISION * scale:
         return 1.0
     t = 0.0
     for _ in range(MOST_ADVANCES):

@@ -13,8 +13,10 @@ from circuittex.base.frozen import frozen
 from circuittex.contact.closest import find_contacts
 from circuittex.contact.curve import BASIS, CurveTable, bezier, curve_table
 from circuittex.contact.kernels import add_contacts
+from circuittex.contact.law import pair_penalty
 from circuittex.contact.passing import PRESSED, likely_cause, safe_step
 from circuittex.contact.search import CONTROL_MOTION, Candidates, coupled_nodes, find_candidates
+from circuittex.design import ContactLaw
 from circuittex.geometry.mesh import FibrilMesh, pair_label
 from circuittex.solvers.pattern import Pattern
 
@@ -57,12 +59,12 @@ def contact_points(mesh: FibrilMesh, per_element: int) -> Floats:
 class PenaltyContact:
     """Energy sum over contact points of 1/2 P* w o^2; both fibrils of a pair carry points, with half weight.
 
-    `penalty` is P* in N/mm2, `per_element` the number of contact points of an element, `skin` (mm) how far
-    candidates reach beyond touch so that they last several iterations.
+    `law` gives P* of each pair (`pair_penalty`), `per_element` is the number of contact points of an element, `skin`
+    (mm) how far candidates reach beyond touch so that they last several iterations.
     """
 
-    def __init__(self, mesh: FibrilMesh, *, penalty: float, per_element: int, skin: float = 0.08) -> None:
-        self.mesh, self.penalty, self.skin = mesh, penalty, skin
+    def __init__(self, mesh: FibrilMesh, *, law: ContactLaw, per_element: int, skin: float = 0.08) -> None:
+        self.mesh, self.law, self.skin = mesh, law, skin
         self.table: CurveTable = curve_table(mesh)
         self.points = contact_points(mesh, per_element)
         size = mesh.length / np.diff(mesh.first_element) / per_element
@@ -110,8 +112,12 @@ class PenaltyContact:
     def energy(self, q: Floats) -> float:
         """Contact energy, N mm."""
         found = self.touching(q)
-        weight = self.weight[self.table.fibril[found.interval_a]]
-        return float(0.5 * self.penalty * np.sum(weight * found.overlap**2))
+        return float(0.5 * np.sum(self._stiffness(found) * found.overlap**2))
+
+    def _stiffness(self, found: Touching) -> Floats:
+        """(C,) P* w of each contact point, N/mm."""
+        a = self.table.fibril[found.interval_a]
+        return np.asarray(pair_penalty(self.mesh, self.law, a, found.fibril_b) * self.weight[a])
 
     def longest(self, q: Floats, direction: Floats) -> float:
         """The part of `direction` that the centre lines can go without colliding (`safe_step`).
@@ -121,10 +127,8 @@ class PenaltyContact:
         mesh = self.mesh
         step = safe_step(self.table, mesh.radius, self.positions(q), self.positions(direction))
         if step.part < 1.0 and step.distance < PRESSED * mesh.radius[list(step.fibrils)].sum():
-            raise PenetrationError(
-                f"{pair_label(mesh, *step.fibrils)} are pressed through one another; "
-                f"{likely_cause(mesh, *step.fibrils, self.penalty)}"
-            )
+            what = f"{pair_label(mesh, *step.fibrils)} are pressed through one another"
+            raise PenetrationError(f"{what}; {likely_cause(mesh, self.law, *step.fibrils)}")
         return step.part
 
     def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
@@ -133,7 +137,7 @@ class PenaltyContact:
         last = table.first_interval[found.fibril_b + 1] - table.first_interval[found.fibril_b]
         k = np.minimum(found.position_b.astype(np.int64), last - 1)
         b = table.first_interval[found.fibril_b] + k
-        weight = self.weight[table.fibril[found.interval_a]]
+        stiffness = self._stiffness(found)
         window_a, window_b = table.window[found.interval_a], table.window[b]
         side_by_side(
             add_contacts,
@@ -148,7 +152,7 @@ class PenaltyContact:
             found.position_b - k,
             (found.position_b <= 0) | (found.position_b >= last),
             found.overlap,
-            self.penalty * weight,
+            stiffness,
             pattern.indptr,
             pattern.neighbour_start,
             pattern.neighbour,
@@ -157,7 +161,7 @@ class PenaltyContact:
             data,
             softening,
         )
-        return float(0.5 * self.penalty * np.sum(weight * found.overlap**2))
+        return float(0.5 * np.sum(stiffness * found.overlap**2))
 
     def _shares(self, window_a: Ints, window_b: Ints) -> list[int]:
         """Nodes that part the rows of the matrix into as many pieces as there are cores for, of much the same work."""

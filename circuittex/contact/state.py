@@ -31,7 +31,7 @@ class ContactState:
     line_load: Floats
     """(C,) p = P* o [28], N/mm."""
     width: Floats
-    """(C,) Hertz width a [29], mm."""
+    """(C,) Hertz half-width a [29], mm."""
     weight: Floats
     """(C,) quadrature weight w, mm of axis (already halved)."""
     conductance: Floats

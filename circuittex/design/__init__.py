@@ -11,19 +11,21 @@ from circuittex.design.experiment import (
     shear,
     uniaxial,
 )
-from circuittex.design.fabric import ContactLaw, Material, Weave, Yarn
+from circuittex.design.fabric import HERTZ, ContactLaw, Material, MaterialPair, Weave, Yarn
 from circuittex.design.files import load_design, parse_design, starter
 from circuittex.design.packing import Packing
 from circuittex.design.paper import plain_weave
 from circuittex.design.statement import Design, Electrical, Numerics, design_hash
 
 __all__ = [
+    "HERTZ",
     "ContactLaw",
     "Design",
     "Electrical",
     "Gradient",
     "Loading",
     "Material",
+    "MaterialPair",
     "Numerics",
     "Packing",
     "Probe",

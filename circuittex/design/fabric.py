@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import field
 from math import pi
 
 from circuittex.base.frozen import frozen
-from circuittex.design.checks import name, real, refuse, store, whole
+from circuittex.design.checks import name, refuse, store, whole
+from circuittex.design.declaration import check, number
 
 MOST_FIBRILS = 10_000
 """Fibrils of one yarn."""
@@ -25,35 +27,33 @@ class Material:
     """
 
     name: str
-    youngs_modulus: float
+    youngs_modulus: float = field(
+        metadata=number(
+            "MPa",
+            "E > 0; the paper's Table I prints 1.26 MPa, its code used 10 MPa",
+            shown="10 MPa",
+            above=0,
+            at_most=STIFFEST,
+        )
+    )
     """E, MPa."""
-    poisson_ratio: float
+    poisson_ratio: float = field(metadata=number("1", "nu, 0 to 0.45", shown="0.0", at_least=0, at_most=0.45))
     """nu, from 0 to 0.45."""
-    density: float
+    density: float = field(metadata=number("g/mm3", "rho > 0", shown="1 g/mm3", above=0, at_most=HEAVIEST))
     """rho, g/mm3."""
-    electrical_conductivity: float
+    electrical_conductivity: float = field(
+        metadata=number(
+            "S/mm", "sigma >= 0; 0 makes an insulating fibril", shown="10 S/mm", at_least=0, at_most=MOST_CONDUCTIVE
+        )
+    )
     """sigma, S/mm; 0 for an insulator."""
-    thermal_conductivity: float
+    thermal_conductivity: float = field(
+        metadata=number("W/(mm K)", "k > 0", shown="1 W/(mm K)", above=0, at_most=MOST_CONDUCTIVE)
+    )
     """k, W/(mm K)."""
 
     def __post_init__(self) -> None:
-        at = f"materials.{name(self.name, 'materials')}"
-        store(
-            self,
-            youngs_modulus=real(self.youngs_modulus, f"{at}.youngs_modulus", "MPa", above=0, at_most=STIFFEST),
-            poisson_ratio=real(self.poisson_ratio, f"{at}.poisson_ratio", at_least=0, at_most=0.45),
-            density=real(self.density, f"{at}.density", "g/mm3", above=0, at_most=HEAVIEST),
-            electrical_conductivity=real(
-                self.electrical_conductivity,
-                f"{at}.electrical_conductivity",
-                "S/mm",
-                at_least=0,
-                at_most=MOST_CONDUCTIVE,
-            ),
-            thermal_conductivity=real(
-                self.thermal_conductivity, f"{at}.thermal_conductivity", "W/(mm K)", above=0, at_most=MOST_CONDUCTIVE
-            ),
-        )
+        check(self, f"materials.{name(self.name, 'materials')}")
 
 
 @frozen
@@ -70,11 +70,15 @@ class Yarn:
     name: str
     rows: tuple[int, ...]
     """Fibrils in each row."""
-    radius: float
+    radius: float = field(metadata=number("mm", "of every fibril", shown="0.15 mm", above=0, at_most=THICKEST))
     """R of every fibril, mm."""
-    spacing: float
+    spacing: float = field(metadata=number("mm", "between the axes of neighbours in a row", shown="0.3 mm", above=0))
     """Distance of neighbours within a row, mm."""
-    row_spacing: float
+    row_spacing: float = field(
+        metadata=number(
+            "mm", "optional, between neighbouring rows, vertically; default: spacing", shown="0.3 mm", above=0
+        )
+    )
     """Vertical distance of neighbouring rows, mm."""
     materials: tuple[Material, ...]
     """One for each fibril."""
@@ -86,14 +90,8 @@ class Yarn:
             raise refuse(
                 f"{at}.materials", len(self.materials), f"{sum(rows)} fibrils (rows) need one material each, row by row"
             )
-        store(
-            self,
-            rows=rows,
-            radius=real(self.radius, f"{at}.radius", "mm", above=0, at_most=THICKEST),
-            spacing=real(self.spacing, f"{at}.spacing", "mm", above=0),
-            row_spacing=real(self.row_spacing, f"{at}.row_spacing", "mm", above=0),
-            materials=tuple(self.materials),
-        )
+        store(self, rows=rows, materials=tuple(self.materials))
+        check(self, at)
 
     @property
     def n_fibrils(self) -> int:
@@ -128,9 +126,15 @@ class Weave:
     """The kind of each warp yarn."""
     weft: tuple[Yarn, ...]
     """The kind of each weft yarn."""
-    pitch: float
+    pitch: float = field(
+        metadata=number("mm", "between neighbouring yarn axes, in both directions", shown="2 mm", above=0)
+    )
     """Distance of neighbouring yarn axes in both directions, mm."""
-    amplitude: float
+    amplitude: float = field(
+        metadata=number(
+            "mm", "height H of a yarn axis above or below the mid-plane at a crossing", shown="0.525 mm", at_least=0
+        )
+    )
     """Height H of a yarn axis above or below the mid-plane at a crossing, mm."""
 
     def __post_init__(self) -> None:
@@ -139,9 +143,8 @@ class Weave:
             draft=check_draft(self.draft, "weave.draft"),
             warp=tuple(self.warp),
             weft=tuple(self.weft),
-            pitch=real(self.pitch, "weave.pitch", "mm", above=0),
-            amplitude=real(self.amplitude, "weave.amplitude", "mm", at_least=0),
         )
+        check(self, "weave")
         for which, wanted in (("warp", len(self.draft)), ("weft", len(self.draft[0]))):
             if len(getattr(self, which)) != wanted:
                 side = "row" if which == "warp" else "column"
@@ -213,25 +216,74 @@ def check_draft(draft: object, field: str) -> tuple[tuple[int, ...], ...]:
     )
 
 
+HERTZ = "hertz"
+"""The penalty P* = E*/2 of each pair of materials, with which a crossing of two cylinders is Hertz's contact."""
+
+
 @frozen
-class ContactLaw:
-    """How fibrils push, conduct and warm one another where they touch [28, 30, 31].
+class ContactProperties:
+    """How two fibrils push, conduct and warm one another where they touch [28, 30, 31]."""
+
+    penalty: float | str = field(
+        metadata=number(
+            "N/mm2",
+            'P* > 0: force per mm of axis and mm of overlap; or "hertz": E*/2 of each pair of materials',
+            shown="5 N/mm2",
+            above=0,
+            words=(HERTZ,),
+        )
+    )
+    """P*, N/mm2: line load per overlap; or 'hertz', E*/2 with 1/E* = (1 - nu^2)/E + (1 - nu'^2)/E'."""
+    conductivity: float = field(
+        metadata=number(
+            "S/mm2", "sigma_c >= 0; 0 insulates the fibrils from one another", shown="0.01 S/mm2", at_least=0
+        )
+    )
+    """sigma_c, S/mm2."""
+    heat_transfer: float = field(metadata=number("W/(mm2 K)", "h_c >= 0", shown="0.1 W/(mm2 K)", at_least=0))
+    """h_c, W/(mm2 K)."""
+
+
+@frozen
+class MaterialPair(ContactProperties):
+    """The contact between fibrils of two materials, where it differs from that of the rest.
+
+    >>> MaterialPair("hertz", 0.0, 0.1, ("silver", "nylon")).materials
+    ('silver', 'nylon')
+    """
+
+    materials: tuple[str, str]
+    """Names of the two, in any order; the same twice for a material with itself."""
+
+    def __post_init__(self) -> None:
+        check(self, f"contact.pairs.{'-'.join(map(str, self.materials))}")
+
+
+@frozen
+class ContactLaw(ContactProperties):
+    """The contact between fibrils: of all materials, or of those without an entry among the pairs.
 
     >>> ContactLaw(5.0, 0.01, 0.1).penalty
     5.0
     """
 
-    penalty: float
-    """P*, N/mm2: line load per overlap."""
-    conductivity: float
-    """sigma_c, S/mm2."""
-    heat_transfer: float
-    """h_c, W/(mm2 K)."""
+    pairs: tuple[MaterialPair, ...] = ()
+    """Pairs of materials with properties of their own."""
 
     def __post_init__(self) -> None:
-        store(
-            self,
-            penalty=real(self.penalty, "contact.penalty", "N/mm2", above=0),
-            conductivity=real(self.conductivity, "contact.conductivity", "S/mm2", at_least=0),
-            heat_transfer=real(self.heat_transfer, "contact.heat_transfer", "W/(mm2 K)", at_least=0),
-        )
+        check(self, "contact")
+        store(self, pairs=tuple(self.pairs))
+        seen: set[frozenset[str]] = set()
+        for pair in self.pairs:
+            if frozenset(pair.materials) in seen:
+                raise refuse("contact.pairs", list(pair.materials), "the pair is listed twice")
+            seen.add(frozenset(pair.materials))
+
+    def between(self, one: str, other: str) -> ContactProperties:
+        """The properties of the contact between two materials, by their names.
+
+        >>> law = ContactLaw(5.0, 0.01, 0.1, (MaterialPair(5.0, 0.0, 0.1, ("silver", "nylon")),))
+        >>> law.between("nylon", "silver").conductivity, law.between("silver", "silver").conductivity
+        (0.0, 0.01)
+        """
+        return next((pair for pair in self.pairs if {*pair.materials} == {one, other}), self)

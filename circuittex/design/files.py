@@ -10,9 +10,14 @@ from pathlib import Path
 
 from circuittex.base.errors import DesignError
 from circuittex.design.checks import refuse
+from circuittex.design.declaration import starter_lines
+from circuittex.design.fabric import ContactLaw, Material, Weave, Yarn
+from circuittex.design.packing import Packing
 from circuittex.design.reader import read_design
-from circuittex.design.statement import Design
+from circuittex.design.statement import Design, Electrical, Numerics
 
+DECLARED: tuple[type, ...] = (Material, Yarn, Weave, ContactLaw, Electrical, Numerics, Packing)
+"""The parts of a design whose keys are declared beside their fields, in the order of the starter design."""
 _LARGEST_FILE = 10_000_000  # bytes; a draft of a thousand by a thousand yarns takes a third of it
 
 
@@ -55,7 +60,10 @@ def starter() -> str:
     >>> parse_design(tomllib.loads(starter())).weave.yarn_names[0]
     'warp1'
     """
-    return files("circuittex.design").joinpath("data/starter.toml").read_text(encoding="utf-8")
+    text = files("circuittex.design").joinpath("data/starter.toml").read_text(encoding="utf-8")
+    for kind in DECLARED:
+        text = text.replace(f"#@ {kind.__name__}\n", starter_lines(kind) + "\n")
+    return text
 
 
 def _toml(text: str) -> Mapping[str, object]:

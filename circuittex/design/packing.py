@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import field
+
 from circuittex.base.frozen import frozen
-from circuittex.design.checks import real, store, whole
+from circuittex.design.declaration import check, count, number
 
 MOST_SEED = 2**63 - 1
 """The largest whole number of TOML and HDF5."""
@@ -21,26 +23,30 @@ class Packing:
     (True, False)
     """
 
-    seed: int = 0
+    seed: int = field(
+        default=0, metadata=count("which of the random packings, a whole number", 0, MOST_SEED, shown="0")
+    )
     """Which of the random packings."""
-    lateral: float = 0.0
+    lateral: float = field(
+        default=0.0,
+        metadata=number("mm", "of each fibril across its yarn, varying smoothly along it", shown="0 mm", at_least=0),
+    )
     """Of the place of each fibril across its yarn, in the plane of the fabric, at any point along it, mm."""
-    vertical: float = 0.0
+    vertical: float = field(
+        default=0.0, metadata=number("mm", "the same, normal to the fabric", shown="0 mm", at_least=0)
+    )
     """The same, normal to the fabric, mm."""
-    twist: float = 0.0
+    twist: float = field(
+        default=0.0, metadata=number("1/mm", "turns per length of each yarn about its axis", shown="0 1/m", at_least=0)
+    )
     """Of the twist of each yarn about its axis, turns per mm; constant along the yarn and none at its middle."""
-    phase: float = 0.0
+    phase: float = field(
+        default=0.0, metadata=number("mm", "shift of each yarn's wave along the yarn", shown="0 mm", at_least=0)
+    )
     """Of the shift of each yarn's wave along the yarn, mm."""
 
     def __post_init__(self) -> None:
-        store(
-            self,
-            seed=whole(self.seed, "packing.seed", 0, MOST_SEED),
-            lateral=real(self.lateral, "packing.lateral", "mm", at_least=0),
-            vertical=real(self.vertical, "packing.vertical", "mm", at_least=0),
-            twist=real(self.twist, "packing.twist", "turns/mm", at_least=0),
-            phase=real(self.phase, "packing.phase", "mm", at_least=0),
-        )
+        check(self, "packing")
 
     @property
     def regular(self) -> bool:

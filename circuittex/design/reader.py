@@ -8,6 +8,7 @@ from math import hypot, inf
 from typing import TypeVar
 
 from circuittex.design.checks import is_name, name, one_of, real, refuse, truth, whole
+from circuittex.design.declaration import keys, read
 from circuittex.design.experiment import (
     MOST_STRETCH,
     Gradient,
@@ -21,7 +22,7 @@ from circuittex.design.experiment import (
     shear,
     uniaxial,
 )
-from circuittex.design.fabric import ContactLaw, Material, Weave, Yarn, check_draft, check_rows
+from circuittex.design.fabric import ContactLaw, Material, MaterialPair, Weave, Yarn, check_draft, check_rows
 from circuittex.design.packing import Packing
 from circuittex.design.statement import FORMAT, Design, Electrical, Numerics
 from circuittex.design.table import Table, quantity
@@ -32,23 +33,6 @@ MOST_STATES = 10_000
 _T = TypeVar("_T")
 _END = re.compile(r"([A-Za-z0-9_-]+?)([+-])", re.ASCII)
 
-_MATERIAL_UNITS = {
-    "youngs_modulus": "MPa",
-    "poisson_ratio": "1",
-    "density": "g/mm3",
-    "electrical_conductivity": "S/mm",
-    "thermal_conductivity": "W/(mm K)",
-}
-_CONTACT_UNITS = {"penalty": "N/mm2", "conductivity": "S/mm2", "heat_transfer": "W/(mm2 K)"}
-_NUMERICS_UNITS = {
-    "tolerance": "N",
-    "overlap_warning": "1",
-    "overlap_limit": "1",
-    "merge_length": "mm",
-    "snap_length": "mm",
-    "drop_fraction": "1",
-}
-_PACKING_UNITS = {"lateral": "mm", "vertical": "mm", "twist": "1/mm", "phase": "mm"}
 _LOADING_KEYS = {
     "uniaxial": ("strain", "steps", "strains", "axis", "unload", "free"),
     "biaxial": ("strain", "steps", "strains", "unload"),
@@ -90,9 +74,9 @@ def read_design(mapping: object) -> Design:
         loading=tuple(_loading(value, path) for value, path in _entries(top, "loading")),
         terminals=tuple(_named(top, "terminals", _terminal, optional=True).values()),
         probes=tuple(_probe(value, path) for value, path in _entries(top, "probes")),
-        electrical=_electrical(top.value.get("electrical", {})),
-        numerics=_numerics(top.value.get("numerics", {})),
-        packing=_packing(top.value.get("packing", {})),
+        electrical=Electrical(**read(Electrical, Table(top.value.get("electrical", {}), "electrical"))),
+        numerics=Numerics(**read(Numerics, Table(top.value.get("numerics", {}), "numerics"))),
+        packing=Packing(**read(Packing, Table(top.value.get("packing", {}), "packing"))),
     )
 
 
@@ -116,22 +100,17 @@ def _entries(top: Table, key: str) -> Iterator[tuple[object, str]]:
 
 
 def _material(value: object, path: str, label: str) -> Material:
-    table = Table(value, path, tuple(_MATERIAL_UNITS))
-    return Material(label, **{key: table.number(key, unit) for key, unit in _MATERIAL_UNITS.items()})
+    return Material(label, **read(Material, Table(value, path)))
 
 
 def _yarn(value: object, path: str, label: str, materials: Mapping[str, Material]) -> Yarn:
-    table = Table(value, path, ("rows", "radius", "spacing", "row_spacing", "material", "materials"))
+    if isinstance(value, Mapping) and "spacing" in value:
+        value = {"row_spacing": value["spacing"], **value}
+    table = Table(value, path)
+    table.only(("rows", *keys(Yarn), "material", "materials"))
     rows = check_rows(table.get("rows", "the number of fibrils in each row, such as [3, 4, 3]"), table.at("rows"))
-    spacing = table.number("spacing", "mm")
-    return Yarn(
-        name=label,
-        rows=rows,
-        radius=table.number("radius", "mm"),
-        spacing=spacing,
-        row_spacing=table.number("row_spacing", "mm") if table.has("row_spacing") else spacing,
-        materials=_fibril_materials(table, sum(rows), materials),
-    )
+    numbers = read(Yarn, table, "rows", "material", "materials")
+    return Yarn(name=label, rows=rows, materials=_fibril_materials(table, sum(rows), materials), **numbers)
 
 
 def _fibril_materials(table: Table, n_fibrils: int, materials: Mapping[str, Material]) -> tuple[Material, ...]:
@@ -148,14 +127,13 @@ def _fibril_materials(table: Table, n_fibrils: int, materials: Mapping[str, Mate
 
 
 def _weave(value: object, yarns: Mapping[str, Yarn]) -> Weave:
-    table = Table(value, "weave", ("draft", "warp", "weft", "pitch", "amplitude"))
+    table = Table(value, "weave", ("draft", "warp", "weft", *keys(Weave)))
     draft = check_draft(table.get("draft", "a matrix of 0 and 1, one row for each warp yarn"), "weave.draft")
     return Weave(
         draft=draft,
         warp=_weave_yarns(table, "warp", len(draft), yarns),
         weft=_weave_yarns(table, "weft", len(draft[0]), yarns),
-        pitch=table.number("pitch", "mm"),
-        amplitude=table.number("amplitude", "mm"),
+        **read(Weave, table, "draft", "warp", "weft"),
     )
 
 
@@ -167,8 +145,25 @@ def _weave_yarns(table: Table, key: str, n: int, yarns: Mapping[str, Yarn]) -> t
 
 
 def _contact(value: object) -> ContactLaw:
-    table = Table(value, "contact", tuple(_CONTACT_UNITS))
-    return ContactLaw(**{key: table.number(key, unit) for key, unit in _CONTACT_UNITS.items()})
+    table = Table(value, "contact")
+    common = read(ContactLaw, table, "pairs")
+    entries = table.items("pairs", "tables [[contact.pairs]]") if table.has("pairs") else []
+    return ContactLaw(**common, pairs=tuple(_pair(entry, table, i) for i, entry in enumerate(entries)))
+
+
+def _pair(value: object, contact: Table, i: int) -> MaterialPair:
+    """The contact of two materials; what it leaves out is that of the rest."""
+    path = f"{contact.at('pairs')}[{i}]"
+    table = Table(value, path)
+    table.only(("materials", *keys(MaterialPair)))
+    wanted = "the names of two materials, such as ['silver', 'nylon']"
+    names = table.items("materials", wanted)
+    if len(names) != 2:
+        raise refuse(table.at("materials"), names, f"it must list {wanted}")
+    common = {key: entry for key, entry in contact.value.items() if key in keys(MaterialPair)}
+    values = read(MaterialPair, Table({**common, **table.value}, path), "materials")
+    first, second = (name(each, f"{table.at('materials')}[{j}]") for j, each in enumerate(names))
+    return MaterialPair(**values, materials=(first, second))
 
 
 def _loading(value: object, path: str) -> Loading:
@@ -266,23 +261,6 @@ def _probe(value: object, path: str) -> Probe:
         sink=table.text("sink", "the name of a terminal"),
         voltage=table.number("voltage", "V"),
     )
-
-
-def _electrical(value: object) -> Electrical:
-    return Electrical(**Table(value, "electrical", ("conduction", "contact_heat")).value)
-
-
-def _numerics(value: object) -> Numerics:
-    known = tuple(Numerics.__dataclass_fields__)
-    table = Table(value, "numerics", known)
-    numbers = {key: table.number(key, unit) for key, unit in _NUMERICS_UNITS.items() if table.has(key)}
-    return Numerics(**{**table.value, **numbers})
-
-
-def _packing(value: object) -> Packing:
-    table = Table(value, "packing", ("seed", *_PACKING_UNITS))
-    numbers = {key: table.number(key, unit) for key, unit in _PACKING_UNITS.items() if table.has(key)}
-    return Packing(**{**table.value, **numbers})
 
 
 def _choice(value: object, path: str, known: Mapping[str, _T]) -> _T:

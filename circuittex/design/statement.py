@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import fields, is_dataclass
+from dataclasses import field, fields, is_dataclass
 
-from circuittex.base.frozen import frozen
-from circuittex.design.checks import distinct, one_of, real, refuse, store, title, truth, whole
+from circuittex.base.frozen import frozen, same
+from circuittex.design.checks import distinct, refuse, title
+from circuittex.design.declaration import check, choice, count, flag, number
 from circuittex.design.experiment import Loading, Probe, Terminal
 from circuittex.design.fabric import ContactLaw, Weave
 from circuittex.design.packing import Packing
@@ -26,15 +27,24 @@ class Electrical:
     'reference'
     """
 
-    conduction: str = "reference"
+    conduction: str = field(
+        default="reference",
+        metadata=choice(
+            '"reference": sigma constant in the reference frame (the paper\'s law); "current": in the current frame, '
+            "stretched fibrils resist more",
+            ("reference", "current"),
+            shown="reference",
+        ),
+    )
     """'reference': sigma constant in the reference frame (the paper's law); 'current': the material keeps
     its conductivity in the current frame, so that a stretched fibril resists more."""
-    contact_heat: bool = True
+    contact_heat: bool = field(
+        default=True, metadata=flag("whether the Joule heat of the contacts warms the fibrils", shown=True)
+    )
     """Whether the Joule heat of the contacts warms the fibrils, half to each side."""
 
     def __post_init__(self) -> None:
-        one_of(self.conduction, "electrical.conduction", ("reference", "current"))
-        truth(self.contact_heat, "electrical.contact_heat")
+        check(self, "electrical")
 
 
 @frozen
@@ -45,49 +55,79 @@ class Numerics:
     20
     """
 
-    elements: int = 20
+    elements: int = field(default=20, metadata=count("of each fibril, at least 2", 2, 10_000, shown="20"))
     """Elements of each fibril."""
-    order: int = 2
+    order: int = field(default=2, metadata=count("of the elements, 1 or 2", 1, 2, shown="2"))
     """Polynomial order of the elements, 1 or 2."""
-    contact_points: int = 4
+    contact_points: int = field(default=4, metadata=count("of each element, 1 to 20", 1, 20, shown="4"))
     """Contact points of each element, on either side."""
-    section_degree: int = 7
+    section_degree: int = field(
+        default=7, metadata=count("of the quadrature rule over the section, 6 to 15", 6, 15, shown="7")
+    )
     """Degree of the section's quadrature rule. Below 6 its points tell how a fibril is spun about its axis, which
     a round fibril does not know, and the relaxation creeps along that spin."""
-    tolerance: float = 1e-6
+    tolerance: float = field(
+        default=1e-6,
+        metadata=number("N", "largest free force that counts as equilibrium", shown="1e-6 N", above=0),
+    )
     """Largest free force at equilibrium, N."""
-    max_iterations: int = 200
+    max_iterations: int = field(
+        default=200,
+        metadata=count("Newton iterations before a relaxation is given up or its step halved", 1, 100_000, shown="200"),
+    )
     """Newton iterations before a relaxation is given up; an increment of a loading path is then made in halves."""
-    overlap_warning: float = 0.3
+    overlap_warning: float = field(
+        default=0.3,
+        metadata=number(
+            "1",
+            "overlap of two fibrils over R + R' from which on a state comes with a warning",
+            shown="0.3",
+            above=0,
+            at_most=1,
+        ),
+    )
     """Overlap of two fibrils over R + R' from which on a state comes with a warning: the law of contact is for small
     ones."""
-    overlap_limit: float = 0.5
+    overlap_limit: float = field(
+        default=0.5,
+        metadata=number(
+            "1", "the same from which on a state is not recorded but an error", shown="0.5", above=0, at_most=1
+        ),
+    )
     """Overlap over R + R' from which on a state is not recorded: the law of contact means nothing there."""
-    merge_length: float = 1.0
+    merge_length: float = field(
+        default=1.0,
+        metadata=number(
+            "mm",
+            "netlists: contacts of a fibril pair in bins of this length merge; 0: none",
+            shown="1 mm",
+            at_least=0,
+        ),
+    )
     """Contacts of a fibril pair within bins of this length become one resistor in the netlists, mm; 0 keeps all. At
     most the length of the longest fibril."""
-    snap_length: float = 1e-3
+    snap_length: float = field(
+        default=1e-3,
+        metadata=number(
+            "mm", "netlists: feet closer than this on a fibril share a node; 0: none", shown="0.001 mm", at_least=0
+        ),
+    )
     """Feet closer than this on a fibril share a node in the netlists, mm; 0 keeps all. At most a tenth of the
     shortest element: feet that lie as far apart as contact points must stay apart."""
-    drop_fraction: float = 1e-6
+    drop_fraction: float = field(
+        default=1e-6,
+        metadata=number(
+            "1",
+            "netlists: contacts below this fraction of the largest are left out",
+            shown="1e-6",
+            at_least=0,
+            at_most=0.5,
+        ),
+    )
     """Contacts below this fraction of the largest conductance are left out of the netlists."""
 
     def __post_init__(self) -> None:
-        at = "numerics"
-        store(
-            self,
-            elements=whole(self.elements, f"{at}.elements", 2, 10_000),
-            order=whole(self.order, f"{at}.order", 1, 2),
-            contact_points=whole(self.contact_points, f"{at}.contact_points", 1, 20),
-            section_degree=whole(self.section_degree, f"{at}.section_degree", 6, 15),
-            tolerance=real(self.tolerance, f"{at}.tolerance", "N", above=0),
-            max_iterations=whole(self.max_iterations, f"{at}.max_iterations", 1, 100_000),
-            overlap_warning=real(self.overlap_warning, f"{at}.overlap_warning", above=0, at_most=self.overlap_limit),
-            overlap_limit=real(self.overlap_limit, f"{at}.overlap_limit", above=0, at_most=1),
-            merge_length=real(self.merge_length, f"{at}.merge_length", "mm", at_least=0),
-            snap_length=real(self.snap_length, f"{at}.snap_length", "mm", at_least=0),
-            drop_fraction=real(self.drop_fraction, f"{at}.drop_fraction", at_least=0, at_most=0.5),
-        )
+        check(self, "numerics")
 
 
 @frozen
@@ -113,6 +153,7 @@ class Design:
         self._check_size()
         self._check_lengths()
         self._check_packing()
+        self._check_pairs()
         self._check_terminals()
         self._check_probes()
 
@@ -158,6 +199,14 @@ class Design:
         for key, (most, meaning) in largest.items():
             if getattr(self.packing, key) > most:
                 raise refuse(f"packing.{key}", getattr(self.packing, key), f"it must be at most {most:.4g} {meaning}")
+
+    def _check_pairs(self) -> None:
+        known = dict.fromkeys(material.name for yarn in self.weave.yarns for material in yarn.materials)
+        for pair in self.contact.pairs:
+            for material in pair.materials:
+                if material not in known:
+                    allowed = "it must be a material of the weave's yarns: " + ", ".join(map(repr, known))
+                    raise refuse("contact.pairs.materials", material, allowed)
 
     def _check_terminals(self) -> None:
         known = self.weave.yarn_names
@@ -207,7 +256,10 @@ def design_hash(design: Design) -> str:
 def _canonical(value: object) -> object:
     """Plain lists, dictionaries and repr'd floats, so that the text is the same in every process."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: _canonical(getattr(value, field.name)) for field in fields(value)}
+        # What is as the default has it is left out, so that a key which older designs lack leaves their hash alone.
+        said = {each.name: getattr(value, each.name) for each in fields(value)}
+        left_out = {each.name for each in fields(value) if same(said[each.name], each.default)}
+        return {name: _canonical(part) for name, part in said.items() if name not in left_out}
     if isinstance(value, tuple | list):
         return [_canonical(item) for item in value]
     return repr(value) if isinstance(value, float) else value

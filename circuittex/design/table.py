@@ -15,17 +15,23 @@ _LONGEST_KEY = 60  # characters shown of one
 
 
 class Table:
-    """A mapping at a dotted path of the design, of which only `known` keys may be used."""
+    """A mapping at a dotted path of the design, of which only `known` keys may be used; any, where they are None."""
 
-    def __init__(self, value: object, path: str, known: tuple[str, ...] | None) -> None:
+    def __init__(self, value: object, path: str, known: tuple[str, ...] | None = None) -> None:
         if not isinstance(value, Mapping):
             raise refuse(path or "design", value, f"it must be a table{path and f' [{path}]'}")
         self.value, self.path = value, path
         for key in value:
             if not isinstance(key, str):
                 raise refuse(path or "design", key, "keys must be text")
-            if known is not None and key not in known:
-                raise refuse(self.at(key), value[key], _unknown(key, known))
+        if known is not None:
+            self.only(known)
+
+    def only(self, known: tuple[str, ...]) -> None:
+        """Refuse keys that are not known."""
+        for key in self.value:
+            if key not in known:
+                raise refuse(self.at(key), self.value[key], _unknown(key, known))
 
     def at(self, key: str) -> str:
         """Dotted path of a key."""

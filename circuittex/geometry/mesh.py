@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import field
+
 import numpy as np
 
 from circuittex.base.arrays import Floats, Ints
@@ -49,6 +51,10 @@ class FibrilMesh:
     """(Y,) for example 'warp1'; the warp runs along x, the weft along y."""
     yarn_axis: Ints
     """(Y,) 0 for a yarn along x, 1 along y."""
+    material: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    """(F,) place of each fibril's material in `material_names`; empty where no contact law asks for it."""
+    material_names: tuple[str, ...] = ()
+    """Names of the materials, in the order of their first fibrils."""
 
     @property
     def order(self) -> int:

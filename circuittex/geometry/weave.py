@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from circuittex.design import Design
+from circuittex.design import Design, Material
+from circuittex.design.declaration import keys
 from circuittex.geometry.centre_lines import centre_lines
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.overlap import check_order, check_overlaps
@@ -33,6 +34,7 @@ def build_mesh(design: Design) -> FibrilMesh:
     first_node = np.arange(n_fibrils + 1) * n_nodes
     within = np.arange(numerics.elements)[:, None] * numerics.order + np.arange(numerics.order + 1)
     materials = [material for kind in weave.yarns for material in kind.materials]
+    names = list(dict.fromkeys(material.name for material in materials))
     return FibrilMesh(
         position=lines.position.reshape(-1, 3),
         directors=lines.directors.reshape(-1, 2, 3),
@@ -43,11 +45,9 @@ def build_mesh(design: Design) -> FibrilMesh:
         yarn=lines.yarn,
         length=lines.length,
         radius=np.array([kind.radius for kind in weave.yarns])[lines.yarn],
-        youngs_modulus=np.array([material.youngs_modulus for material in materials]),
-        poisson_ratio=np.array([material.poisson_ratio for material in materials]),
-        density=np.array([material.density for material in materials]),
-        electrical_conductivity=np.array([material.electrical_conductivity for material in materials]),
-        thermal_conductivity=np.array([material.thermal_conductivity for material in materials]),
+        **{name: np.array([getattr(material, name) for material in materials]) for name in keys(Material)},
         yarn_names=weave.yarn_names,
         yarn_axis=np.repeat([0, 1], [len(weave.warp), len(weave.weft)]),
+        material=np.array([names.index(material.name) for material in materials]),
+        material_names=tuple(names),
     )

@@ -21,18 +21,18 @@ def check_sound(study: Study, step: Step, r: Floats, contacts: ContactState) -> 
 
     Raises `PenetrationError`, with one sentence that names the state, the pair and the likely cause.
     """
-    mesh, numerics, penalty = study.mesh, study.design.numerics, study.design.contact.penalty
+    mesh, numerics, law = study.mesh, study.design.numerics, study.design.contact
     wrong = passed_through(study, step, r)
     if len(wrong):
         first, second = wrong[0].tolist()
         others = f" (and {len(wrong) - 1} other pairs)" if len(wrong) > 1 else ""
         what = f"{pair_label(mesh, first, second)} have passed through one another{others}"
-        raise PenetrationError(f"{step.name}: {what}; {likely_cause(mesh, first, second, penalty)}")
+        raise PenetrationError(f"{step.name}: {what}; {likely_cause(mesh, law, first, second)}")
     overlap, first, second = deepest_overlap(contacts)
     if overlap >= numerics.overlap_limit:
         what = f"{pair_label(mesh, first, second)} overlap by {overlap:.2f} of R + R'"
         limit = f"a state is recorded below {numerics.overlap_limit:g} (numerics.overlap_limit)"
-        raise PenetrationError(f"{step.name}: {what}, {limit}; {likely_cause(mesh, first, second, penalty)}")
+        raise PenetrationError(f"{step.name}: {what}, {limit}; {likely_cause(mesh, law, first, second)}")
 
 
 def passed_through(study: Study, step: Step, r: Floats) -> Ints:

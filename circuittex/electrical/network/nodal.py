@@ -84,7 +84,8 @@ def solve_nodal(circuit: Circuit, drive: Mapping[str, float]) -> NodalSolution:
     >>> solution.port_current.round(12).tolist()
     [0.142857142857, 0.0, 0.0, -0.142857142857]
 
-    Raises `CircuitError` for an unknown port, a voltage that is not finite, or an island that no driven port reaches.
+    Raises `CircuitError` for an unknown port, a voltage that is not finite, a resistance that is not positive and
+    finite, or an island that no driven port reaches.
     """
     return solve_drives(circuit, [drive])[0]
 
@@ -111,6 +112,7 @@ def port_basis(circuit: Circuit, ports: Sequence[str]) -> PortBasis:
     in their difference. So voltages are kept as a rounded part, whose differences are exact there, and a small rest
     that iterative refinement finds.
     """
+    _refuse_resistances(circuit)
     grounded = _grounded(circuit, ports)
     potential = np.zeros((circuit.n_nodes, len(grounded.fixed)))
     potential[grounded.fixed, np.arange(len(grounded.fixed))] = 1.0
@@ -124,6 +126,18 @@ def port_basis(circuit: Circuit, ports: Sequence[str]) -> PortBasis:
         if np.abs(step).max(initial=0.0) <= np.finfo(float).eps ** 2:
             break
     return PortBasis(circuit=circuit, ports=tuple(ports), potential=potential + rest, flow=flow)
+
+
+def _refuse_resistances(circuit: Circuit) -> None:
+    """Raise where a resistance is not positive and finite, by hand or from a file: it would be solved all the same."""
+    wrong = np.flatnonzero(~((circuit.resistance > 0.0) & np.isfinite(circuit.resistance)))
+    if len(wrong):
+        first = int(wrong[0])
+        more = f" ({len(wrong)} such resistors in all)" if len(wrong) > 1 else ""
+        raise CircuitError(
+            f"resistor {circuit.resistor_names[first]!r}: {float(circuit.resistance[first])!r} ohm is not usable; a "
+            f"resistance must be positive and finite{more}"
+        )
 
 
 def rounding_errors(circuit: Circuit, drive: Mapping[str, float]) -> tuple[float, Floats]:

@@ -23,24 +23,55 @@ def to_pyspice(circuit: Circuit, drive: Mapping[str, float], title: str = "circu
 
     Raises `CircuitError` for more than `LARGEST` resistors.
     """
-    part = reached_part(circuit, drive)
+    part = _small(reached_part(circuit, drive))
+    _name_library()
+    from PySpice.Spice.Netlist import Circuit as PySpiceCircuit
+
+    built = PySpiceCircuit(unique_names([title])[0])
+    nodes = _add_resistors(built, part)
+    for port, volts in drive.items():
+        pin = nodes[int(part.port_node[part.ports.index(port)])]
+        built.V(pin, pin, built.gnd, float(volts))
+    return built
+
+
+def to_pyspice_subcircuit(circuit: Circuit, name: str) -> Any:
+    """Return a `PySpice.Spice.Netlist.SubCircuit` called `name` whose pins are the ports, in their order.
+
+    A circuit takes it with `.subcircuit(...)` and places it with `.X('1', name, node, node, ...)`.
+
+    Raises `CircuitError` for more than `LARGEST` resistors.
+    """
+    part = _small(circuit)
+    _name_library()
+    from PySpice.Spice.Netlist import SubCircuit
+
+    nodes = unique_names(part.node_names)
+    built = SubCircuit(unique_names([name])[0], *(nodes[pin] for pin in part.port_node.tolist()))
+    _add_resistors(built, part)
+    return built
+
+
+def _small(part: Circuit) -> Circuit:
     if part.n_resistors > LARGEST:
         raise CircuitError(
             f"{part.n_resistors} resistors are too many for PySpice, which builds and parses them one by one "
             f"(at most {LARGEST}); write the text with circuittex.netlist.deck"
         )
+    return part
+
+
+def _name_library() -> None:
     library = find_library("ngspice")
     if library:
         os.environ.setdefault("NGSPICE_LIBRARY_PATH", library)
-    from PySpice.Spice.Netlist import Circuit as PySpiceCircuit
 
-    built = PySpiceCircuit(unique_names([title])[0])
+
+def _add_resistors(built: Any, part: Circuit) -> tuple[str, ...]:
+    """Add all resistors; return the words that stand for the nodes."""
     nodes = unique_names(part.node_names)
     for name, (i, j), ohm in zip(
         unique_names(part.resistor_names), part.resistor_nodes.tolist(), part.resistance.tolist(), strict=True
     ):
         built.R(name, nodes[i], nodes[j], ohm)
-    for port, volts in drive.items():
-        pin = nodes[int(part.port_node[part.ports.index(port)])]
-        built.V(pin, pin, built.gnd, float(volts))
-    return built
+    return nodes

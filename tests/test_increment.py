@@ -53,12 +53,13 @@ def clamps(cell: Cell, state: Increment) -> Floats:
 
 
 def straight_cell(**numerics: Any) -> tuple[Design, FibrilMesh]:
-    """Two by two single fibrils of 4 mm, straight, the weft 1 mm above the warp, out of touch: closed forms hold."""
+    """Two by two single fibrils of 4 mm, straight, the weft 10 mm above the warp, out of touch: closed forms hold."""
     design, mesh = small_cell((1,), tolerance=TIGHT, **numerics)
     along = np.eye(3)[mesh.yarn_axis[mesh.yarn[mesh.node_fibril]]]
     up = np.tile([0.0, 0.0, 1.0], (mesh.n_nodes, 1))
     directors = np.stack([np.cross(up, along), up], axis=1)
-    return design, replace(mesh, position=mesh.position * [1.0, 1.0, 0.0] + along[:, 1:2] * up, directors=directors)
+    above = 10.0 * along[:, 1:2] * up
+    return design, replace(mesh, position=mesh.position * [1.0, 1.0, 0.0] + above, directors=directors)
 
 
 def pull(stretch: float) -> float:
@@ -216,7 +217,7 @@ def test_halves_lead_where_the_whole_step_leads(cell: Cell) -> None:
 
 def test_a_step_that_starts_inside_out_is_halved() -> None:
     """Fibrils turned by 140 degrees have their directors behind them, even as predicted; half way they do not."""
-    design, mesh = straight_cell(elements=4)
+    design, mesh = straight_cell(yarns=1, elements=4)  # one fibril each way: nothing meets where they buckle
     angle = np.deg2rad(140)
     target = 1.2 * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     said: list[str] = []
@@ -226,7 +227,7 @@ def test_a_step_that_starts_inside_out_is_halved() -> None:
     assert len(said) == 1
     assert "inside out" in said[0]
     force = clamp_force(mesh, state.equilibrium.reaction)
-    assert force[0, :2] == pytest.approx(2 * pull(1.2) * target[:, 0] / 1.2, abs=1e-5)
+    assert force[0, :2] == pytest.approx(pull(1.2) * target[:, 0] / 1.2, abs=1e-5)
 
 
 Tried = list[tuple[float, float]]

@@ -234,9 +234,9 @@ BAD: list[tuple[list[tuple[Keys, Any]], str, str]] = [
     ([((*MATERIAL, "electrical_conductivity"), 1e10)], "materials.fibril.electrical_conductivity", "<= 1e+09 S/mm"),
     # order at the start
     (
-        [((*YARN, "rows"), [1, 1]), (("weave", "amplitude"), "0.075 mm")],
+        [((*YARN, "rows"), [1, 1]), ((*YARN, "row_spacing"), "0.4 mm"), (("weave", "amplitude"), "0.1 mm")],
         "weave.amplitude",
-        "start on the wrong side of one another; above 0.15 mm their rows are apart",
+        "start on the wrong side of one another; above 0.2 mm their rows are apart",
     ),
     ([(("weave", "amplitude"), "0 mm")], "weave.amplitude", "inside one another, at most 0.15 mm"),
     ([(("weave", "pitch"), "1.3 mm")], "weave.amplitude", "inside one another"),

@@ -59,7 +59,10 @@ def straight_cell(**numerics: Any) -> tuple[Design, FibrilMesh]:
     up = np.tile([0.0, 0.0, 1.0], (mesh.n_nodes, 1))
     directors = np.stack([np.cross(up, along), up], axis=1)
     above = 10.0 * along[:, 1:2] * up
-    return design, replace(mesh, position=mesh.position * [1.0, 1.0, 0.0] + above, directors=directors)
+    under = replace(design.weave, draft=tuple((0,) * len(row) for row in design.weave.draft))
+    return replace(design, weave=under), replace(
+        mesh, position=mesh.position * [1.0, 1.0, 0.0] + above, directors=directors
+    )
 
 
 def pull(stretch: float) -> float:

@@ -74,26 +74,17 @@ def safe_step(table: CurveTable, radius: Floats, r: Floats, motion: Floats) -> S
     >>> safe_step(table, np.array([0.3, 0.3]), r, -down).part
     1.0
     """
-    start, way = (_run_on(table, chords(table, x)) for x in (r, motion))
+    start, way = chords(table, r), chords(table, motion)
     end = start + way
-    fibril = np.concatenate([table.fibril, *[np.arange(len(radius))] * 2])
-    reach = COLLISION * radius[fibril][:, None]
+    reach = COLLISION * radius[table.fibril][:, None]
     low = np.minimum(start, end).min(axis=1) - reach
     high = np.maximum(start, end).max(axis=1) + reach
     axis = int(np.argmax(np.ptp(low, axis=0)))
     order = np.argsort(low[:, axis], kind="stable")
     found = np.array([1.0, 0.0, 0.0, np.inf])
-    _sweep(order, axis, low, high, fibril, radius, start, way, found)
+    _sweep(order, axis, low, high, table.fibril, radius, start, way, found)
     pair = sorted(found[1:3].astype(int).tolist())
     return SafeStep(float(found[0]), (pair[0], pair[1]), float(found[3]))
-
-
-def _run_on(table: CurveTable, points: Floats) -> Floats:
-    """The chords of all intervals, then those of every fibril's minus end and of its plus end, run on by its length."""
-    minus, plus = points[table.first_interval[:-1], 0], points[table.first_interval[1:] - 1, -1]
-    t = np.linspace(0.0, 1.0, CHORDS + 1)[:, None]
-    beyond = t * (plus - minus)[:, None]
-    return np.concatenate([points, minus[:, None] - beyond, plus[:, None] + beyond])
 
 
 def likely_cause(mesh: FibrilMesh, law: ContactLaw, first: int, second: int) -> str:

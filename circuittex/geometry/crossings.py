@@ -1,15 +1,15 @@
 """Which fibril passes over which: counted from the centre lines alone, whatever they were moved through.
 
 In a projection every place where two lines cross has a sign, that of the turn from the one drawn first to the other.
-The sum of the signs of those crossings at which the first is the upper one,
+The sums of the signs of all their crossings, and of those alone at which the first is the upper one,
 
-    n(f, g) = sum of sign(u_f x u_g)  over crossings with f above g,
+    total(f, g) = sum of sign(u_f x u_g),   above(f, g) = the same where f is above g,
 
-cannot change while the lines move, unless one is drawn through the other or an end passes over or under a line. Lines
-that run on straight for ever have no ends, so n tells whether they passed through one another, by its value before and
-after and by nothing in between: half of what is called the linking number of closed lines. Two fibrils that cross, as
-warp and weft, are seen from above, where n is 1 or 0 as the draft says. Parallel ones are seen along a direction across
-them. The directions are askew, so that no symmetry of a weave puts a crossing on a node.
+do not change while the lines move, unless one is drawn through the other or an end passes over or under a line: of
+closed lines, `above` would be the linking number. So they tell whether two fibrils passed through one another by their
+values before and after, and by nothing in between. Warp and weft are seen from above, where `total` is 1, and `above`
+is 1 or 0 as the draft says. Parallel fibrils are seen along a direction across them. The directions are askew, so that
+no symmetry of a weave puts a crossing on a node.
 """
 
 from __future__ import annotations
@@ -27,8 +27,6 @@ ASKEW = 0.0123, 0.0071
 """Slopes dx/dz and dy/dz of the direction in which crossings of warp and weft are seen: almost from above."""
 ACROSS = 1.0
 """Angle about the axis of parallel fibrils, from the normal of the fabric, of the direction in which they are seen."""
-BEYOND = 10.0
-"""How far lines run on beyond their ends, in parts of the largest extent of all."""
 
 
 @frozen
@@ -44,95 +42,92 @@ class Lines:
 
 
 @frozen
-class Windings:
-    """The sums n(f, g) of the pairs for which they are not 0."""
+class Crossings:
+    """The K pairs of lines that cross in a projection."""
 
     pairs: Ints
-    """(K, 2) fibrils, in rising order; f is the warp fibril of two that cross, else the lower number."""
-    number: Ints
-    """(K,) n(f, g)."""
+    """(K, 2) the first and the second line, in rising order: of warp and weft the warp is the first."""
+    total: Ints
+    """(K,) sum of the signs of their crossings."""
+    above: Ints
+    """(K,) sum of the signs of those at which the first is the upper one."""
 
 
-def windings(lines: Lines) -> Windings:
-    """n(f, g) for all pairs: of different axes seen from above, of one axis seen across it.
-
-    A warp line over a weft line counts 1, under it 0:
+def woven(lines: Lines) -> Crossings:
+    """The crossings of lines along x with lines along y, seen from above.
 
     >>> t = np.linspace(-1.0, 1.0, 5)[:, None]
     >>> over = np.vstack([t * [1.0, 0.0, 0.0] + [0.0, 0.0, 0.1], t * [0.0, 1.0, 0.0]])
-    >>> windings(Lines(over, np.array([0, 5, 10]), np.array([0, 1]))).number
-    array([1])
-    >>> len(windings(Lines(over * [1.0, 1.0, -1.0], np.array([0, 5, 10]), np.array([0, 1]))).number)
+    >>> found = woven(Lines(over, np.array([0, 5, 10]), np.array([0, 1])))
+    >>> found.total, found.above
+    (array([1]), array([1]))
+    """
+    points = lines.points
+    view = np.column_stack([points[:, :2] - points[:, 2:] * np.array(ASKEW), points[:, 2]])
+    return _crossings(lines, view, across=True)
+
+
+def beside(lines: Lines) -> Crossings:
+    """The crossings of lines of one axis with one another, seen across them.
+
+    >>> t = np.linspace(-1.0, 1.0, 5)[:, None]
+    >>> apart = np.vstack([t * [1.0, 0.0, 0.0] + [0.0, 0.0, 0.1], t * [1.0, 0.0, 0.0]])
+    >>> len(beside(Lines(apart, np.array([0, 5, 10]), np.array([0, 0]))).pairs)
     0
     """
-    points, first = _run_on(lines)
-    line = np.repeat(np.arange(len(lines.axis)), np.diff(first))
-    segments = np.flatnonzero(line[:-1] == line[1:])
-    found = []
-    for across, view in ((True, _from_above(points)), (False, _along_the_fabric(points, lines.axis[line]))):
-        low = np.minimum(view[segments, 0], view[segments + 1, 0])
-        order = segments[np.argsort(low, kind="stable")]
-        count = _find(view, line, lines.axis, order, across, np.empty((0, 3), dtype=np.int64))
-        hits = np.empty((count, 3), dtype=np.int64)
-        _find(view, line, lines.axis, order, across, hits)
-        found.append(hits)
-    return _summed(np.concatenate(found))
-
-
-def changed(before: Windings, after: Windings) -> Ints:
-    """(K, 2) the pairs whose n differs.
-
-    >>> one = Windings(np.array([[0, 1], [0, 2]]), np.array([1, 1]))
-    >>> changed(one, Windings(np.array([[0, 1], [1, 2]]), np.array([1, -1])))
-    array([[0, 2],
-           [1, 2]])
-    """
-    hits = [np.column_stack([w.pairs, sign * w.number]) for w, sign in ((after, 1), (before, -1))]
-    return _summed(np.concatenate(hits)).pairs
-
-
-def drafted(draft: Ints, yarn: Ints) -> Windings:
-    """n(f, g) that a draft (warp yarns, weft yarns) asks of the warp and weft fibrils in the yarns `yarn` (F,).
-
-    Pairs of one axis have none here.
-
-    >>> drafted(np.array([[1, 0]]), np.array([0, 1, 2])).pairs
-    array([[0, 1]])
-    """
-    n_warp = len(draft)
-    warp, weft = np.flatnonzero(yarn < n_warp), np.flatnonzero(yarn >= n_warp)
-    f, g = np.nonzero(draft[yarn[warp][:, None], yarn[weft] - n_warp])
-    return _summed(np.column_stack([warp[f], weft[g], np.ones(len(f), dtype=np.int64)]))
-
-
-def _summed(hits: Ints) -> Windings:
-    """The sums of hits (H, 3), of a pair and a number each, that are not 0."""
-    pairs, place = np.unique(hits[:, :2], axis=0, return_inverse=True)
-    number = np.zeros(len(pairs), dtype=np.int64)
-    np.add.at(number, place.reshape(-1), hits[:, 2])
-    return Windings(pairs[number != 0], number[number != 0])
-
-
-def _run_on(lines: Lines) -> tuple[Floats, Ints]:
-    """The points and offsets of lines that run on along their axes at both ends."""
-    points, head, tail = lines.points, lines.first[:-1], lines.first[1:] - 1
-    outward = np.eye(3)[lines.axis] * np.sign(points[tail, lines.axis] - points[head, lines.axis])[:, None]
-    far = BEYOND * float(np.ptp(points, axis=0).max()) * outward
-    # Between two lines the tail of the one comes before the head of the other.
-    at, more = np.concatenate([tail + 1, head]), np.concatenate([points[tail] + far, points[head] - far])
-    return np.insert(points, at, more, axis=0), lines.first + 2 * np.arange(len(lines.first))
-
-
-def _from_above(points: Floats) -> Floats:
-    """(P, 3) two coordinates of the view from above and the height along it."""
-    return np.column_stack([points[:, :2] - points[:, 2:] * np.array(ASKEW), points[:, 2]])
-
-
-def _along_the_fabric(points: Floats, axis: Ints) -> Floats:
-    """(P, 3) the same for the view across the lines' own axes (P,)."""
-    rows = np.arange(len(points))
+    rows, points = np.arange(len(lines.points)), lines.points
+    axis = np.repeat(lines.axis, np.diff(lines.first))
     along, other, up = points[rows, axis], points[rows, 1 - axis], points[:, 2]
-    return np.column_stack([along, cos(ACROSS) * other - sin(ACROSS) * up, sin(ACROSS) * other + cos(ACROSS) * up])
+    view = np.column_stack([along, cos(ACROSS) * other - sin(ACROSS) * up, sin(ACROSS) * other + cos(ACROSS) * up])
+    return _crossings(lines, view, across=False)
+
+
+def against_draft(found: Crossings, draft: Ints, yarn: Ints) -> Ints:
+    """(K, 2) the pairs of warp and weft fibrils that are on the wrong side of one another.
+
+    draft (warp yarns, weft yarns): 1 where the warp is above; yarn (F,) of each fibril, the warp's first. A pair that
+    does not cross any more, since one has left the other's end, is on no side.
+
+    >>> one = Crossings(np.array([[0, 1]]), np.array([1]), np.array([1]))
+    >>> [len(against_draft(one, np.array([[over]]), np.array([0, 1]))) for over in (1, 0)]
+    [0, 1]
+    """
+    over = draft[yarn[found.pairs[:, 0]], yarn[found.pairs[:, 1]] - len(draft)]
+    return np.asarray(found.pairs[found.above != over * found.total])
+
+
+def changed(before: Crossings, after: Crossings) -> Ints:
+    """(K, 2) the pairs that changed sides: another `above` with the same `total`, so that no end was passed.
+
+    >>> none = np.empty((0, 2), dtype=np.int64)
+    >>> wound = Crossings(np.array([[0, 2]]), np.array([0]), np.array([1]))
+    >>> changed(Crossings(none, none[:, 0], none[:, 0]), wound)
+    array([[0, 2]])
+    """
+    counts = [np.column_stack([c.total, c.above]) * sign for c, sign in ((after, 1), (before, -1))]
+    pairs, difference = _summed(np.concatenate([after.pairs, before.pairs]), np.concatenate(counts))
+    return np.asarray(pairs[(difference[:, 0] == 0) & (difference[:, 1] != 0)])
+
+
+def _summed(pairs: Ints, numbers: Ints) -> tuple[Ints, Ints]:
+    """The different ones of pairs (H, 2), in rising order, and the sums of their numbers (H, N)."""
+    found, place = np.unique(pairs, axis=0, return_inverse=True)
+    total = np.zeros((len(found), numbers.shape[1]), dtype=np.int64)
+    np.add.at(total, place.reshape(-1), numbers)
+    return found, total
+
+
+def _crossings(lines: Lines, view: Floats, across: bool) -> Crossings:
+    """The crossings in a view: two coordinates and the height of every point."""
+    line = np.repeat(np.arange(len(lines.axis)), np.diff(lines.first))
+    segments = np.flatnonzero(line[:-1] == line[1:])
+    order = segments[np.argsort(np.minimum(view[segments, 0], view[segments + 1, 0]), kind="stable")]
+    hits = np.empty((0, 4), dtype=np.int64)
+    count = _find(view, line, lines.axis, order, across, hits)
+    hits = np.empty((count, 4), dtype=np.int64)
+    _find(view, line, lines.axis, order, across, hits)
+    pairs, numbers = _summed(hits[:, :2], hits[:, 2:])
+    return Crossings(pairs, numbers[:, 0], numbers[:, 1])
 
 
 @compiled
@@ -160,7 +155,7 @@ def _upper(view: Any, p: int, q: int) -> bool:
 
 @compiled
 def _find(view: Any, line: Any, axis: Any, order: Any, across: bool, hits: Any) -> int:
-    """Number of crossings in the view at which the first line is the upper one; fills hits (H, 3): first, second, sign.
+    """Number of crossings in the view; fills hits (H, 4): first and second line, sign, sign where the first is above.
 
     order (S,): the segments, each by its first point, by the lower end of their first coordinate. `across`: pairs of
     lines of different axes, else of the same.
@@ -185,8 +180,9 @@ def _find(view: Any, line: Any, axis: Any, order: Any, across: bool, hits: Any) 
                 view, p, p + 1, q + 1
             ):
                 continue
-            if _upper(view, p, q):
-                if count < hits.shape[0]:
-                    hits[count, 0], hits[count, 1], hits[count, 2] = line[p], line[q], 1 if left else -1
-                count += 1
+            if count < hits.shape[0]:
+                sign = 1 if left else -1
+                hits[count, 0], hits[count, 1], hits[count, 2] = line[p], line[q], sign
+                hits[count, 3] = sign if _upper(view, p, q) else 0
+            count += 1
     return count

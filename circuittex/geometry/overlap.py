@@ -12,7 +12,7 @@ from circuittex.base.errors import DesignError
 from circuittex.design import Weave, Yarn
 from circuittex.design.packing import Packing
 from circuittex.geometry.centre_lines import CentreLines, centre_lines
-from circuittex.geometry.crossings import Lines, changed, drafted, windings
+from circuittex.geometry.crossings import Lines, against_draft, woven
 
 _SAMPLES = 16  # chords a crossing; in the paper's cell they leave the curve by 0.003 mm at the most
 _CHUNK = 50_000  # chords searched at a time, which bounds the memory
@@ -59,9 +59,8 @@ def check_order(weave: Weave, packing: Packing = Packing()) -> None:  # noqa: B0
     lines = _sampled(weave, packing)
     n, samples = lines.position.shape[:2]
     axis = (lines.yarn >= len(weave.warp)).astype(np.int64)
-    found = windings(Lines(lines.position.reshape(-1, 3), samples * np.arange(n + 1), axis))
-    pairs = changed(drafted(np.array(weave.draft), lines.yarn), found)
-    pairs = pairs[axis[pairs[:, 0]] != axis[pairs[:, 1]]]
+    found = woven(Lines(lines.position.reshape(-1, 3), samples * np.arange(n + 1), axis))
+    pairs = against_draft(found, np.array(weave.draft), lines.yarn)
     if not len(pairs):
         return
     labels = [_label(weave, lines.yarn, fibril)[0] for fibril in pairs[0].tolist()]

@@ -14,6 +14,7 @@ from circuittex.design import Design
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
 from circuittex.relaxation.relax import Equilibrium, move, relax
+from circuittex.relaxation.sides import check_sides
 from circuittex.solvers.linear import LinearSolver
 
 SMALLEST = Fraction(1, 64)
@@ -46,10 +47,11 @@ def advance(
 ) -> Increment:
     """The equilibrium at the average deformation gradient `after` (2, 2), from the one `now` at `before`.
 
-    An increment that does not converge within the design's `max_iterations` is made in two halves, these in halves
-    again where they must be, down to `SMALLEST`; `say` is told. Between the ends the gradient is F = before +
-    t (after - before): a straight line, which for the small increments of a path differs little from any other.
-    The ends of yarns along `free`, 'x' or 'y', are not held (`relax`); `report` is told of every iteration.
+    An increment that does not converge within the design's `max_iterations`, or leads fibrils through one another or
+    round an end, is made in two halves, these in halves again where they must be, down to `SMALLEST`; `say` is told.
+    Between the ends the gradient is F = before + t (after - before): a straight line, which for the small increments
+    of a path differs little from any other. The ends of yarns along `free`, 'x' or 'y', are not held (`relax`);
+    `report` is told of every iteration.
 
     Raises `ConvergenceError`, with the history of the last try, where the smallest part does not converge.
     """
@@ -59,6 +61,7 @@ def advance(
         try:
             start = move(now, gradient, target)
             equilibrium = relax(mesh, design, start, before=now, free=free, solver=solver, report=report)
+            check_sides(mesh, design, equilibrium.configuration.r, target, free)
         except ConvergenceError as error:
             iterations += max(0, len(error.history) - 1)
             if size == SMALLEST:

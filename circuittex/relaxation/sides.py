@@ -1,0 +1,55 @@
+"""Whether fibrils are still on the sides of one another that they were woven to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from circuittex.base.arrays import Floats, Ints
+from circuittex.base.errors import PenetrationError
+from circuittex.contact.curve import CurveTable, curve_table
+from circuittex.contact.passing import chords, likely_cause
+from circuittex.design import Design
+from circuittex.geometry.crossings import Lines, against_draft, beside, changed, woven
+from circuittex.geometry.mesh import FibrilMesh, pair_label
+
+REST = np.eye(2)
+
+
+def check_sides(mesh: FibrilMesh, design: Design, r: Floats, gradient: Floats, free: str = "") -> None:
+    """Refuse nodes r (N, 3) at which fibrils have passed through one another.
+
+    `gradient` (2, 2) is the average one from the start to r; yarns along `free`, 'x' or 'y', have free ends.
+
+    Raises `PenetrationError`, with one sentence that names the first pair and the likely cause.
+    """
+    wrong = passed_through(mesh, design, r, gradient, free)
+    if len(wrong):
+        first, second = wrong[0].tolist()
+        others = f" (and {len(wrong) - 1} other pairs)" if len(wrong) > 1 else ""
+        what = f"{pair_label(mesh, first, second)} have passed through one another or round an end{others}"
+        raise PenetrationError(f"{what}; {likely_cause(mesh, design.contact, first, second)}")
+
+
+def passed_through(mesh: FibrilMesh, design: Design, r: Floats, gradient: Floats, free: str = "") -> Ints:
+    """(K, 2) the pairs of fibrils that are not on the sides of one another that the draft says.
+
+    Parallel ones are compared with the start, which is that of the mesh. The lines are seen in its plane, to which the
+    inverse of the average gradient takes the clamped ends back. Parallel fibrils with free ends may go round one
+    another there: they are left out.
+    """
+    table, axis = curve_table(mesh), mesh.yarn_axis[mesh.yarn]
+    start, now = _lines(mesh, table, mesh.position, REST), _lines(mesh, table, r, gradient)
+    wrong = against_draft(woven(now), np.array(design.weave.draft), mesh.yarn)
+    parallel = changed(beside(start), beside(now))
+    held = axis[parallel[:, 0]] != ("x", "y", "").index(free)
+    return np.concatenate([wrong, parallel[held]])
+
+
+def _lines(mesh: FibrilMesh, table: CurveTable, r: Floats, gradient: Floats) -> Lines:
+    """The contact curves as polylines, their plane moved back by the inverse of the gradient."""
+    points = chords(table, r)
+    many = points.shape[1] - 1
+    stops = many * table.first_interval
+    lines = np.insert(points[:, :-1].reshape(-1, 3), stops[1:], r[mesh.end_nodes(+1)], axis=0)
+    lines[:, :2] = lines[:, :2] @ np.linalg.inv(gradient).T
+    return Lines(lines, stops + np.arange(len(stops)), mesh.yarn_axis[mesh.yarn])

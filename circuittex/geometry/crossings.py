@@ -82,18 +82,26 @@ def beside(lines: Lines) -> Crossings:
     return _crossings(lines, view, across=False)
 
 
-def against_draft(found: Crossings, draft: Ints, yarn: Ints) -> Ints:
-    """(K, 2) the pairs of warp and weft fibrils that are on the wrong side of one another.
+def against_draft(found: Crossings, draft: Ints, yarn: Ints) -> tuple[Ints, Ints]:
+    """The pairs (K, 2) of warp and weft fibrils on the wrong side of one another, and those that do not cross any more.
 
-    draft (warp yarns, weft yarns): 1 where the warp is above; yarn (F,) of each fibril, the warp's first. A pair that
-    does not cross any more, since one has left the other's end, is on no side.
+    draft (warp yarns, weft yarns): 1 where the warp is above; yarn (F,) of each fibril, the warp's first. Fibrils that
+    cross more than once must do so on one side; those that do not cross, as one has left the other's end, are on none.
 
     >>> one = Crossings(np.array([[0, 1]]), np.array([1]), np.array([1]))
-    >>> [len(against_draft(one, np.array([[over]]), np.array([0, 1]))) for over in (1, 0)]
+    >>> [len(against_draft(one, np.array([[over]]), np.array([0, 1]))[0]) for over in (1, 0)]
     [0, 1]
+    >>> against_draft(one, np.array([[1, 0]]), np.array([0, 1, 2]))[1]
+    array([[0, 2]])
     """
     over = draft[yarn[found.pairs[:, 0]], yarn[found.pairs[:, 1]] - len(draft)]
-    return np.asarray(found.pairs[found.above != over * found.total])
+    wrong = found.pairs[found.above != over * found.total]
+    warp, weft = np.flatnonzero(yarn < len(draft)), np.flatnonzero(yarn >= len(draft))
+    crosses = np.zeros((len(yarn), len(yarn)), dtype=np.bool_)
+    held = found.pairs[found.total != 0]
+    crosses[held[:, 0], held[:, 1]] = True
+    f, g = np.nonzero(~crosses[np.ix_(warp, weft)])
+    return wrong, np.column_stack([warp[f], weft[g]])
 
 
 def changed(before: Crossings, after: Crossings) -> Ints:

@@ -60,7 +60,7 @@ def check_order(weave: Weave, packing: Packing = Packing()) -> None:  # noqa: B0
     n, samples = lines.position.shape[:2]
     axis = (lines.yarn >= len(weave.warp)).astype(np.int64)
     found = woven(Lines(lines.position.reshape(-1, 3), samples * np.arange(n + 1), axis))
-    pairs = against_draft(found, np.array(weave.draft), lines.yarn)
+    pairs, _ = against_draft(found, np.array(weave.draft), lines.yarn)
     if not len(pairs):
         return
     labels = [_label(weave, lines.yarn, fibril)[0] for fibril in pairs[0].tolist()]

@@ -16,33 +16,44 @@ REST = np.eye(2)
 
 
 def check_sides(mesh: FibrilMesh, design: Design, r: Floats, gradient: Floats, free: str = "") -> None:
-    """Refuse nodes r (N, 3) at which fibrils have passed through one another.
+    """Refuse nodes r (N, 3) at which fibrils have passed through one another or slipped off one another's ends.
 
     `gradient` (2, 2) is the average one from the start to r; yarns along `free`, 'x' or 'y', have free ends.
 
     Raises `PenetrationError`, with one sentence that names the first pair and the likely cause.
     """
-    wrong = passed_through(mesh, design, r, gradient, free)
+    wrong, gone = passed_through(mesh, design, r, gradient, free)
+    pairs = wrong if len(wrong) else gone
+    if not len(pairs):
+        return
+    first, second = pairs[0].tolist()
+    others = f" (and {len(pairs) - 1} other pairs)" if len(pairs) > 1 else ""
     if len(wrong):
-        first, second = wrong[0].tolist()
-        others = f" (and {len(wrong) - 1} other pairs)" if len(wrong) > 1 else ""
-        what = f"{pair_label(mesh, first, second)} have passed through one another or round an end{others}"
-        raise PenetrationError(f"{what}; {likely_cause(mesh, design.contact, first, second)}")
+        what, cause = (
+            "have passed through one another or round an end",
+            likely_cause(mesh, design.contact, first, second),
+        )
+    else:
+        what, cause = (
+            "do not cross any more: one has slipped off the other's end",
+            "the cell is too small for that load",
+        )
+    raise PenetrationError(f"{pair_label(mesh, first, second)} {what}{others}; {cause}")
 
 
-def passed_through(mesh: FibrilMesh, design: Design, r: Floats, gradient: Floats, free: str = "") -> Ints:
-    """(K, 2) the pairs of fibrils that are not on the sides of one another that the draft says.
+def passed_through(mesh: FibrilMesh, design: Design, r: Floats, gradient: Floats, free: str = "") -> tuple[Ints, Ints]:
+    """The pairs (K, 2) of fibrils that are not on the sides of one another that the draft says, and those that left it.
 
     Parallel ones are compared with the start, which is that of the mesh. The lines are seen in its plane, to which the
-    inverse of the average gradient takes the clamped ends back. Parallel fibrils with free ends may go round one
-    another there: they are left out.
+    inverse of the average gradient takes the clamped ends back. Fibrils with free ends may leave those that they cross,
+    and go round parallel ones: such pairs are left out.
     """
     table, axis = curve_table(mesh), mesh.yarn_axis[mesh.yarn]
     start, now = _lines(mesh, table, mesh.position, REST), _lines(mesh, table, r, gradient)
-    wrong = against_draft(woven(now), np.array(design.weave.draft), mesh.yarn)
+    wrong, gone = against_draft(woven(now), np.array(design.weave.draft), mesh.yarn)
     parallel = changed(beside(start), beside(now))
     held = axis[parallel[:, 0]] != ("x", "y", "").index(free)
-    return np.concatenate([wrong, parallel[held]])
+    return np.concatenate([wrong, parallel[held]]), gone[: 0 if free else None]
 
 
 def _lines(mesh: FibrilMesh, table: CurveTable, r: Floats, gradient: Floats) -> Lines:

@@ -9,7 +9,7 @@ PYTEST_ARGS ?= -n auto
 PY := $(VENV)/bin/python
 export VENV PYTHON
 
-.PHONY: run paper test lint style types docs clean ngspice help
+.PHONY: run paper test test-oldest lint style types docs clean ngspice help
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -24,6 +24,11 @@ paper: $(VENV)/.ready ngspice ## the whole study of the paper for both parameter
 	$(PY) -m circuittex report results/paper --beside results/paper_table
 
 test: $(VENV)/.ready ngspice ## run the whole test suite
+	$(PY) -m pytest $(PYTEST_ARGS)
+
+test-oldest: ## run the test suite with the oldest admitted version of every dependency
+	@.ci/setup oldest
+	@.ci/setup ngspice
 	$(PY) -m pytest $(PYTEST_ARGS)
 
 lint: style types ## style, format and types

@@ -10,6 +10,7 @@ import pytest
 from synthetic_study import synthetic_study
 
 from circuittex.command.cli import main
+from circuittex.command.exit_codes import ExitCode
 from circuittex.design import plain_weave
 from circuittex.results.records import Study
 from circuittex.results.store import write_study_start
@@ -49,7 +50,7 @@ def test_other_cells_have_no_claims_to_compare(
     own: Study, other: Study, named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folders = [stored(tmp_path / "own", own), stored(tmp_path / "other", other)]
-    assert main(["report", folders[0], "--beside", folders[1]]) == 2
+    assert main(["report", folders[0], "--beside", folders[1]]) == ExitCode.DESIGN
     text = capsys.readouterr().err
     assert f"{tmp_path / named} must be a study of the paper's cell" in text
     assert not (tmp_path / "own" / "report.html").exists()
@@ -57,5 +58,5 @@ def test_other_cells_have_no_claims_to_compare(
 
 def test_results_that_are_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code = stored(tmp_path / "code", CODE)
-    assert main(["report", code, "--beside", str(tmp_path / "none")]) == 2
+    assert main(["report", code, "--beside", str(tmp_path / "none")]) == ExitCode.FILES
     assert "there is no results file here" in capsys.readouterr().err

@@ -19,6 +19,7 @@ import circuittex
 from circuittex.base.errors import ConvergenceError
 from circuittex.base.lock import locked
 from circuittex.command.cli import Progress, main
+from circuittex.command.exit_codes import ExitCode, code_of
 from circuittex.design import Design, load_design, starter
 from circuittex.electrical.network.circuit import CONTACT, Circuit
 from circuittex.electrical.network.nodal import NodalSolution, solve_nodal
@@ -161,7 +162,7 @@ def test_run_whose_routes_disagree_is_no_success(
 ) -> None:
     changed = {difference: value}
     replace_study(monkeypatch, with_verification(lambda v: replace(v, **changed)))  # type: ignore[arg-type]
-    assert main(["run", str(design_file), "--out", str(tmp_path / "out"), "--quiet"]) == 1
+    assert main(["run", str(design_file), "--out", str(tmp_path / "out"), "--quiet"]) == ExitCode.DISAGREE
     text = capsys.readouterr().err
     assert "the routes DISAGREE in stretch-0.0250:" in text
     assert "relaxed" not in text
@@ -190,7 +191,10 @@ def test_run_without_probes_has_nothing_to_disagree_about(
 def test_run_needs_a_worker(
     workers: str, design_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["run", str(design_file), "--out", str(tmp_path / "out"), "--workers", workers, "--quiet"]) == 2
+    assert (
+        main(["run", str(design_file), "--out", str(tmp_path / "out"), "--workers", workers, "--quiet"])
+        == ExitCode.DESIGN
+    )
     assert f"workers: {workers} is not usable" in error_line(capsys)
 
 
@@ -205,14 +209,14 @@ def test_run_passes_its_options_on(design_file: Path, tmp_path: Path, monkeypatc
 
 
 def test_run_refuses_a_file_as_folder(design_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", str(design_file), "--out", str(design_file)]) == 2
+    assert main(["run", str(design_file), "--out", str(design_file)]) == ExitCode.DESIGN
     line = error_line(capsys)
     assert "results folder" in line
     assert "a file is in the way" in line
 
 
 def test_run_refuses_a_folder_below_a_file(design_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", str(design_file), "--out", str(design_file / "results")]) == 2
+    assert main(["run", str(design_file), "--out", str(design_file / "results")]) == ExitCode.DESIGN
     assert "a file is in the way" in error_line(capsys)
 
 
@@ -223,20 +227,20 @@ def test_run_refuses_a_folder_that_cannot_be_written(
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr("tempfile.TemporaryFile", refuse)
-    assert main(["run", str(design_file), "--out", str(tmp_path)]) == 2
+    assert main(["run", str(design_file), "--out", str(tmp_path)]) == ExitCode.DESIGN
     assert "Permission denied" in error_line(capsys)
 
 
 def test_unusable_design_leaves_no_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bad = tmp_path / "bad.toml"
     bad.write_text("nonsense = 1\n", encoding="utf-8")
-    assert main(["run", str(bad), "--out", str(tmp_path / "out")]) == 2
+    assert main(["run", str(bad), "--out", str(tmp_path / "out")]) == ExitCode.DESIGN
     assert "nonsense" in error_line(capsys)
     assert not (tmp_path / "out").exists()
 
 
 def test_missing_design(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "none.toml", "--out", str(tmp_path / "out")]) == 2
+    assert main(["run", "none.toml", "--out", str(tmp_path / "out")]) == ExitCode.DESIGN
     assert "none.toml" in error_line(capsys)
 
 
@@ -254,7 +258,7 @@ def test_errors_of_a_study_are_one_line(
         raise error
 
     replace_study(monkeypatch, fail)
-    assert main(["run", str(design_file), "--out", str(tmp_path / "out"), "--quiet"]) == 2
+    assert main(["run", str(design_file), "--out", str(tmp_path / "out"), "--quiet"]) == code_of(error)
     assert " ".join(str(error).split()) in error_line(capsys)
 
 
@@ -279,15 +283,24 @@ def test_interrupted_run_says_what_it_kept(
     assert kept in capsys.readouterr().err
 
 
-def test_other_errors_are_not_hidden(design_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A defect of circuittex is not the user's mistake: it keeps its traceback."""
+def test_an_error_of_circuittex_itself_has_a_code_and_a_sentence(
+    design_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A defect of circuittex is not the user's mistake: it is told apart, and shows its traceback when asked."""
 
     def broken(*_: object, **__: object) -> Study:
-        raise ZeroDivisionError
+        raise ZeroDivisionError("no divisor")
 
     replace_study(monkeypatch, broken)
+    command = ["run", str(design_file), "--out", str(tmp_path / "out"), "--quiet"]
+    monkeypatch.delenv("CIRCUITTEX_DEBUG", raising=False)
+    assert main(command) == ExitCode.INTERNAL
+    text = capsys.readouterr().err
+    assert text.startswith("circuittex: internal error: ZeroDivisionError: no divisor")
+    assert "CIRCUITTEX_DEBUG=1" in text
+    monkeypatch.setenv("CIRCUITTEX_DEBUG", "1")
     with pytest.raises(ZeroDivisionError):
-        main(["run", str(design_file), "--out", str(tmp_path / "out"), "--quiet"])
+        main(command)
 
 
 # Progress
@@ -340,13 +353,13 @@ def computed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("command", ["netlist", "verify", "report"])
 def test_folder_without_results(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([command, str(tmp_path)]) == 2
+    assert main([command, str(tmp_path)]) == ExitCode.FILES
     assert "there is no results file here" in error_line(capsys)
 
 
 @pytest.mark.parametrize("command", ["netlist", "verify"])
 def test_unknown_state_names_the_known_ones(command: str, computed: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([command, str(computed), "--state", "flat"]) == 2
+    assert main([command, str(computed), "--state", "flat"]) == ExitCode.DESIGN
     line = error_line(capsys)
     assert "'flat'" in line
     assert "relaxed, stretch-0.0250" in line
@@ -368,7 +381,7 @@ def test_a_folder_being_written_can_be_read_but_gets_no_report(
     computed: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with locked(computed):
-        assert main(["report", str(computed)]) == 2
+        assert main(["report", str(computed)]) == ExitCode.FILES
         assert "circuittex is writing there already" in error_line(capsys)
         assert main(["netlist", str(computed)]) == 0
 
@@ -404,7 +417,7 @@ def test_deck_of_a_probe_drives_its_terminals(computed: Path, capsys: pytest.Cap
 
 @pytest.mark.parametrize("kind", [[], ["--kind", "subckt"], ["--kind", "reduced"]])
 def test_a_probe_belongs_to_a_deck(kind: list[str], computed: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["netlist", str(computed), "--probe", "parallel", *kind]) == 2
+    assert main(["netlist", str(computed), "--probe", "parallel", *kind]) == ExitCode.DESIGN
     assert "--probe: 'parallel' is not usable; only --kind deck is made for a probe" in error_line(capsys)
 
 
@@ -426,7 +439,7 @@ def test_reduced_netlist(computed: Path, capsys: pytest.CaptureFixture[str]) -> 
 
 
 def test_unknown_probe_names_the_known_ones(computed: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["netlist", str(computed), "--kind", "deck", "--probe", "diagonal"]) == 2
+    assert main(["netlist", str(computed), "--kind", "deck", "--probe", "diagonal"]) == ExitCode.DESIGN
     assert "straight, parallel, perpendicular" in error_line(capsys)
 
 
@@ -449,7 +462,7 @@ def test_verify_without_ngspice_is_no_confirmation(
     computed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("circuittex.electrical.spice.ngspice.find_ngspice", lambda: None)
-    assert main(["verify", str(computed), "--state", "relaxed"]) == 1
+    assert main(["verify", str(computed), "--state", "relaxed"]) == ExitCode.NOT_CHECKED
     assert "NOT confirmed" in capsys.readouterr().out
 
 
@@ -461,5 +474,5 @@ def test_verify_finds_a_route_that_disagrees(
         return NodalSolution(right.voltage * (1 + 1e-8), right.port_current * (1 + 1e-8))
 
     monkeypatch.setattr("circuittex.study.verify.solve_nodal", wrong)
-    assert main(["verify", str(computed), "--state", "relaxed"]) == 1
+    assert main(["verify", str(computed), "--state", "relaxed"]) == ExitCode.DISAGREE
     assert "NOT confirmed" in capsys.readouterr().out

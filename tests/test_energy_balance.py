@@ -24,7 +24,7 @@ from circuittex.relaxation.increment import advance
 from circuittex.relaxation.relax import Equilibrium, move, relax
 from circuittex.results.records import Record, Study
 from circuittex.results.report.energy import energy_section
-from circuittex.results.report.table import number
+from circuittex.results.report.number import number
 from circuittex.results.store import load_study, write_study_start
 from circuittex.results.summary import summary
 from circuittex.results.work import EnergyBalance, balance, clamp_balance, step_balances

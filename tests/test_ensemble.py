@@ -23,6 +23,7 @@ from hypothesis.extra.numpy import arrays
 import circuittex.study.ensemble.run as run_module
 from circuittex.base.errors import ConvergenceError, DesignError, FolderError
 from circuittex.command.cli import main
+from circuittex.command.exit_codes import ExitCode
 from circuittex.design import Design, design_hash, load_design, plain_weave, starter, uniaxial
 from circuittex.design.packing import Packing
 from circuittex.geometry import build_mesh
@@ -479,7 +480,7 @@ def test_the_command_reports_bands_and_failures(
     file = tmp_path / "weave.toml"
     file.write_text(starter(), encoding="utf-8")
     code, taken = run_command(monkeypatch, made_up, str(file), "--members", "20", "--seed", "4", "--workers", "2")
-    assert code == 0
+    assert code == ExitCode.PARTLY
     assert design_hash(taken["design"]) == design_hash(load_design(file))
     assert (taken["members"], taken["seed"], taken["workers"], taken["address"]) == (20, 4, 2, None)
     assert taken["out"] == Path("results", "weave-ensemble")
@@ -500,7 +501,7 @@ def test_the_command_warns_where_routes_disagree_even_if_quiet(
     doubtful = replace(made_up, disagreeing=(("relaxed",), *made_up.disagreeing[1:]))
     words = [str(file), "--members", "20", "--out", str(tmp_path / "e"), "--scheduler", "tcp://node:8786", "--quiet"]
     code, taken = run_command(monkeypatch, doubtful, *words)
-    assert code == 1
+    assert code == ExitCode.DISAGREE
     assert (taken["address"], taken["out"]) == ("tcp://node:8786", tmp_path / "e")
     out, err = capsys.readouterr()
     assert out == ""
@@ -511,3 +512,15 @@ def test_workers_and_a_scheduler_exclude_one_another(capsys: pytest.CaptureFixtu
     with pytest.raises(SystemExit):
         main(["ensemble", "a.toml", "--members", "2", "--workers", "2", "--scheduler", "tcp://node:8786"])
     assert "not allowed with" in capsys.readouterr().err
+
+
+def test_an_ensemble_whose_members_all_fail_is_no_success(
+    made_up: Ensemble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "weave.toml"
+    file.write_text(starter(), encoding="utf-8")
+    lost = replace(made_up, failures=("no equilibrium",) * 20, disagreeing=((),) * 20)
+    words = [str(file), "--members", "20", "--out", str(tmp_path / "e"), "--quiet"]
+    code, _ = run_command(monkeypatch, lost, *words)
+    assert code == ExitCode.NO_EQUILIBRIUM
+    assert "all 20 members failed" in capsys.readouterr().err

@@ -9,6 +9,7 @@ from __future__ import annotations
 import gc
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -82,7 +83,7 @@ def test_whatever_happens_to_workers_and_tasks_the_others_go_on(tmp_path: Path) 
         assert isinstance(found["raises"], OSError)
         assert (tmp_path / "raises").read_text().count("raises") == 3
 
-        values, killed = killed_member(client.scheduler.address, tmp_path / "e")
+        values, killed = killed_member(tmp_path / "e")
         assert killed != os.getpid()
 
         # what is still going on when the block is left ends with it
@@ -100,7 +101,7 @@ def test_whatever_happens_to_workers_and_tasks_the_others_go_on(tmp_path: Path) 
     np.testing.assert_allclose(values, record.clamp_force.ravel(), rtol=0, atol=1e-6)
 
 
-def killed_member(address: str, out: Path) -> tuple[Floats, int]:
+def killed_member(out: Path) -> tuple[Floats, int]:
     """The values of a member whose process is killed once while it computes, and the number of that process."""
     killed: list[int] = []
 
@@ -117,7 +118,7 @@ def killed_member(address: str, out: Path) -> tuple[Floats, int]:
     killer = threading.Thread(target=kill)
     killer.start()
     try:
-        ensemble = run_ensemble(TINY, out, members=1, address=address)
+        ensemble = run_ensemble(TINY, out, members=1, workers=1)
     finally:
         stop.set()
         killer.join()
@@ -202,3 +203,52 @@ def test_without_dask_the_message_says_what_to_install(tmp_path: Path, monkeypat
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(CircuittexError, match=r"pip install 'circuittex\[ensemble\]'"), local_client(1):
         pass
+
+
+STRANGER = """
+import asyncio, pickle, sys
+import distributed
+
+class Touch:
+    def __reduce__(self):
+        return open, (sys.argv[2], "w")
+
+async def touch(address, security):
+    arguments = security.get_connection_args("client") if security is not None else {}
+    comm = await distributed.comm.connect(address, timeout=3, **arguments)
+    message = {"op": "run", "function": pickle.dumps(Touch()), "args": b"", "kwargs": b""}
+    await comm.write(message, serializers=["pickle"])
+    print("answered", await asyncio.wait_for(comm.read(), timeout=3))
+
+for protocol in ("tcp://", "tls://"):
+    for security in (None, distributed.Security.temporary()):
+        try:
+            asyncio.run(touch(sys.argv[1].replace("tls://", protocol), security))
+        except Exception as error:
+            print("refused", type(error).__name__)
+"""
+"""Somebody else on the machine: plainly and with a certificate of their own, has a server make a file."""
+
+
+def stranger(address: str, path: Path) -> str:
+    command = [sys.executable, "-c", STRANGER, address, str(path)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE).stdout
+
+
+def test_nobody_else_reaches_the_workers_of_this_machine(tmp_path: Path) -> None:
+    ran = tmp_path / "ran"
+    with local_client(1) as client:
+        (worker,) = client.scheduler_info()["workers"]
+        for address in (client.scheduler.address, worker):
+            assert address.startswith("tls://127.0.0.1:")
+            assert stranger(address, ran).count("refused") == 4
+        assert client.submit(os.getpid).result(timeout=60) > 0, "the cluster works on"
+    assert not ran.exists()
+
+
+def test_a_stranger_reaches_an_unprotected_worker(tmp_path: Path) -> None:
+    """What the test above would see without TLS."""
+    with distributed.LocalCluster(n_workers=1, processes=False, protocol="tcp://", dashboard_address=None) as cluster:
+        (worker,) = cluster.scheduler_info["workers"]
+        said = stranger(worker, tmp_path / "ran")
+    assert "answered" in said or (tmp_path / "ran").exists()

@@ -46,7 +46,7 @@ ALLOWED: dict[str, set[str]] = {
     },
     "study.ensemble": {
         *{"design", "geometry", "study", "results", "results.store"},
-        *{"results.plot.style", "results.report.frame", "results.report.table"},
+        *{"results.plot.style", "results.report.number", "results.report.page", "results.report.template"},
     },
 }
 ANYTHING = {"command", "__main__"}  # the command line, which nobody imports
@@ -60,6 +60,7 @@ LIBRARIES: dict[str, set[str]] = {
     "networkx": {"electrical.network"},
     "PySpice": {"electrical.spice"},
     "h5py": {"results.store"},
+    "jinja2": {"results.report"},
     "filelock": {"base"},
     "meshio": {"results.vtk"},
     "matplotlib": {"results.plot", "study.ensemble"},
@@ -177,7 +178,20 @@ def test_library_is_known_only_where_it_belongs(library: str) -> None:
     assert users <= LIBRARIES[library]
 
 
-HEAVY = ["numpy", "scipy", "numba", "skfem", "matplotlib", "PySpice", "networkx", "h5py", "meshio", "pypardiso", "dask"]
+HEAVY = [
+    "numpy",
+    "scipy",
+    "numba",
+    "skfem",
+    "matplotlib",
+    "PySpice",
+    "networkx",
+    "h5py",
+    "meshio",
+    "pypardiso",
+    "dask",
+    "jinja2",
+]
 
 
 @pytest.mark.parametrize(

@@ -4,20 +4,27 @@ from __future__ import annotations
 
 import base64
 import re
+import tomllib
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from jinja2 import UndefinedError
+from markupsafe import escape
 from synthetic_study import synthetic_study
 from test_stored_errors import made_up
 from test_summary import disagreeing, unchecked
 
+import circuittex
 from circuittex.design import Packing, Terminal, uniaxial
 from circuittex.results.claims import CLAIMS
 from circuittex.results.plot import FIGURES
 from circuittex.results.records import Study
 from circuittex.results.report import page, write_report
+from circuittex.results.report.template import render
 
 PNG = b"\x89PNG\r\n\x1a\nno real picture"
 STUDY = synthetic_study(3, contacts=40, name="<b>A & \"B\"</b> $HOME 'x'")
@@ -143,8 +150,8 @@ def rows_below(study: Study, heading: str) -> list[str]:
 def test_the_packing_is_stated_where_it_is_random() -> None:
     packing = Packing(seed=7, lateral=0.01, twist=0.002)
     rows = rows_below(replace(STUDY, design=replace(STUDY.design, packing=packing)), "Random packing")
-    settings = ["seed", "7", "lateral", "0.01", "vertical", "0.0", "twist", "0.002", "phase", "0.0"]
-    assert rows[2:12] == settings
+    packing_rows = ["seed", "7", "lateral", "0.01", "vertical", "0.0", "twist", "0.002", "phase", "0.0"]
+    assert rows[2:12] == packing_rows
     assert "Random packing" not in parsed(STUDY).text
 
 
@@ -196,3 +203,57 @@ def test_report_shows_the_figures_it_draws(tmp_path: Path, monkeypatch: pytest.M
         png = (tmp_path / "figures" / f"{name}.png").read_bytes()
         assert base64.b64encode(png).decode() in content
     assert content.count("<figure>") == 2
+
+
+TEXTS = st.text(st.characters(codec="utf-8", exclude_categories=["Cc", "Cs", "Zl", "Zp"]), min_size=1, max_size=60)
+NASTY = [
+    "<script>alert(1)</script>",
+    "&amp;",
+    "\"'><img src=x onerror=y>",
+    "{{ 7 * 7 }}",
+    "{% raw %}",
+    "</title>",
+    "Köper ü",
+]
+
+
+@pytest.mark.parametrize("text", NASTY)
+def test_no_text_becomes_markup(text: str) -> None:
+    assert_text(text)
+
+
+@settings(max_examples=25, deadline=None)
+@given(TEXTS)
+def test_no_title_becomes_markup(text: str) -> None:
+    assume(text.strip() and text.isprintable())
+    assert_text(text)
+
+
+def assert_text(text: str) -> None:
+    """The page with this text in the title, the notes and the warnings has the tags of the usual page, and the text."""
+    record = STUDY.records[0]
+    noted = replace(
+        record,
+        verification=replace(record.verification, note=text, ngspice_checked=False),
+        fit=replace(record.fit, warnings=(text,)),
+    )
+    plain = replace(noted, verification=replace(noted.verification, note="x"), fit=replace(noted.fit, warnings=("x",)))
+    changed = replace(STUDY, design=replace(STUDY.design, name=text), version=text, records=(noted,))
+    usual = replace(STUDY, design=replace(STUDY.design, name="x"), version="x", records=(plain,))
+    tags = re.compile(r"<[a-z/][^>]*>")
+    assert tags.findall(page(changed, {})) == tags.findall(page(usual, {}))
+    assert escape(text) in page(changed, {})
+
+
+def test_a_name_that_a_template_misspells_is_an_error() -> None:
+    with pytest.raises(UndefinedError):
+        render("network.html", head=[], rows=[])
+
+
+def test_the_wheel_holds_the_templates(tmp_path: Path) -> None:
+    """An installed package has them too."""
+    source = Path(circuittex.__file__).parent.parent
+    project = tomllib.loads((source / "pyproject.toml").read_text(encoding="utf-8"))
+    patterns = project["tool"]["setuptools"]["package-data"]["circuittex"]
+    held = {path for pattern in patterns for path in (source / "circuittex").glob(pattern)}
+    assert {*(source / "circuittex").rglob("templates/*")} <= held

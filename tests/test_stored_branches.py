@@ -51,7 +51,7 @@ def test_checks_come_back_bit_for_bit_in_the_order_of_their_states(tmp_path: Pat
     for check in (LOOSE, NONE, KEPT, OTHER):
         append_finding(path, check)
     with h5py.File(path, "r") as file:
-        assert set(file["branches"]) == {"0000", "0001", "0002", "0003"}
+        assert set(file["branches"]) == {check.state for check in CHECKED.branches}
     assert same(load_study(path), CHECKED)
     write_study_start(path, CHECKED)
     assert same(load_study(path), CHECKED)
@@ -61,8 +61,8 @@ def test_a_changed_check_is_noticed(tmp_path: Path) -> None:
     path = tmp_path / "results.h5"
     write_study_start(path, CHECKED)
     with h5py.File(path, "r+") as file:
-        file["branches/0001"].attrs["moved"] = 0.0
-    with pytest.raises(StoreError, match="branch check 0001 does not match its digest"):
+        file[f"branches/{LOOSE.state}"].attrs["moved"] = 0.0
+    with pytest.raises(StoreError, match=rf"branch check {re.escape(LOOSE.state)} does not match its digest"):
         load_study(path)
 
 
@@ -143,9 +143,9 @@ def test_the_report_has_a_row_for_each_check() -> None:
 
 
 def test_both_branches_of_a_bifurcation_stand_side_by_side() -> None:
-    (box,) = re.findall(r'<div class="bad"><h3>.*', section(CHECKED))
+    (box,) = re.findall(r'<div class="bad"><h3>.*?</table>', section(CHECKED), re.DOTALL)
     assert f"Bifurcation in {FORK.name}" in box
-    assert "up to 0.31 mm apart" in box
+    assert "up to 0.31 mm apart" in " ".join(box.split())
     own, other = FORK.outcome, OTHER.again
     for name, values in (
         ("warp +x Fx (N)", (own.clamp_force[0, 0], other.clamp_force[0, 0])),

@@ -113,7 +113,7 @@ def states(folder: Path) -> int:
     if not (folder / "results.h5").exists():
         return 0
     with h5py.File(folder / "results.h5", "r", locking=False) as file:
-        return len(file["records"])
+        return len(file["states"])
 
 
 def test_interrupted_then_killed_then_completed_by_other_numbers_of_workers(

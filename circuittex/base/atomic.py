@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from circuittex.base.errors import CircuittexWarning
+
+UNSUPPORTED = {errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EBADF, errno.ENOLCK}
+"""What file systems answer, network shares among them, that lack a call."""
 PARTIAL = ".partial"
 """What the name of a file ends with until it is complete."""
 
@@ -55,5 +61,24 @@ def _sync_folder(folder: Path) -> None:
         handle = os.open(folder, os.O_RDONLY)
         try:
             os.fsync(handle)
+        except OSError as error:
+            if error.errno not in UNSUPPORTED:
+                raise
+            _note(folder, error.strerror, os.fstat(handle).st_dev)
         finally:
             os.close(handle)
+
+
+_noted: set[int] = set()
+"""File systems of which it has been said."""
+
+
+def _note(folder: Path, reason: str | None, device: int) -> None:
+    if device not in _noted:
+        _noted.add(device)
+        warnings.warn(
+            f"{folder}: its file system cannot be told to keep a renamed file ({reason}); what was written last may be "
+            "lost in a power cut",
+            CircuittexWarning,
+            stacklevel=5,
+        )

@@ -9,6 +9,10 @@ class CircuittexError(Exception):
     """Base of every error that circuittex raises on purpose."""
 
 
+class CircuittexWarning(UserWarning):
+    """What a user should know although the work goes on, such as a protection that the file system does not give."""
+
+
 class DesignError(CircuittexError, ValueError):
     """A design (or an argument) that cannot be used: names the field, the value and what is allowed."""
 
@@ -38,6 +42,10 @@ class CircuitError(CircuittexError, ValueError):
 
 class NgspiceError(CircuittexError, RuntimeError):
     """ngspice is missing, failed, hung, or answered something that cannot be trusted."""
+
+
+class NgspiceUnavailableError(NgspiceError):
+    """There is no ngspice, or none that could answer a circuit of this size in the time allowed: it was not asked."""
 
 
 class StoreError(CircuittexError, ValueError):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
@@ -11,7 +12,8 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from circuittex.base.errors import FolderError
+from circuittex.base.atomic import UNSUPPORTED
+from circuittex.base.errors import CircuittexWarning, FolderError
 
 LOCK = ".circuittex.lock"
 """The file that is locked; it stays when the lock is released, since to remove it would let two in at once."""
@@ -23,7 +25,8 @@ HOLDER = ".circuittex.holder"
 def locked(folder: str | Path) -> Iterator[None]:
     """Hold `folder` against other writers.
 
-    Raises `FolderError` at once where another process writes there, and names it.
+    Raises `FolderError` at once where another process writes there, and names it. On a file system without locks there
+    is nothing to hold: a `CircuittexWarning` says so.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder, locked(folder):
@@ -33,12 +36,19 @@ def locked(folder: str | Path) -> Iterator[None]:
     folder = Path(folder)
     lock, holder = FileLock(folder / LOCK), folder / HOLDER
     try:
-        lock.acquire(timeout=0)
+        with warnings.catch_warnings(record=True) as said:
+            lock.acquire(timeout=0)
+        if said:  # filelock's own way out on some file systems: a file that only its own processes respect
+            _note(folder, str(said[0].message))
     except Timeout:
         raise FolderError(
             f"{folder}: circuittex is writing there already ({_holder(holder)}); wait until it is done, or take "
             "another folder"
         ) from None
+    except (OSError, NotImplementedError) as error:
+        if isinstance(error, OSError) and error.errno not in UNSUPPORTED:
+            raise
+        _note(folder, getattr(error, "strerror", None) or "not supported")
     try:
         with suppress(OSError):  # on a full disk nobody learns who holds the folder, but it is held
             since = datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
@@ -48,6 +58,14 @@ def locked(folder: str | Path) -> Iterator[None]:
         with suppress(OSError):
             holder.unlink(missing_ok=True)
         lock.release()
+
+
+def _note(folder: Path, reason: str) -> None:
+    warnings.warn(
+        f"{folder}: its file system has no locks ({reason}); nothing keeps a second run out of this folder",
+        CircuittexWarning,
+        stacklevel=4,
+    )
 
 
 def _holder(path: Path) -> str:

@@ -4,33 +4,43 @@ from __future__ import annotations
 
 import argparse
 import os
-import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
-from circuittex.base.errors import CircuittexError, DesignError, StoreError
+from circuittex.base.errors import CircuittexError, ConvergenceError, DesignError, StoreError
+from circuittex.command.exit_codes import ExitCode, code_of
 from circuittex.command.options import build_parser
+from circuittex.command.progress import Progress
+from circuittex.command.streams import show_notes, usable_streams, write_utf8
 
 if TYPE_CHECKING:
     from circuittex.design import Design, Probe
     from circuittex.results.records import Record, Study
+    from circuittex.results.verification import Verification
 
 RESULTS = "results.h5"
 """Name of the HDF5 file in a results folder."""
 
-BAD_INPUT, DISAGREE, INTERRUPTED, BROKEN_PIPE = 2, 1, 130, 141
-"""Exit codes besides 0; the last two are what shells report for SIGINT and SIGPIPE."""
+DEBUG = "CIRCUITTEX_DEBUG"
+"""Environment variable: set, an error in circuittex itself is shown with its traceback."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit code.
+    """Run the command line and return its exit code (`ExitCode`).
 
     >>> main(["run", "no-such-file.toml", "--out", "somewhere"])
-    2
+    3
     """
+    return int(_exit_code(arguments))
+
+
+def _exit_code(arguments: Sequence[str] | None) -> ExitCode:
+    usable_streams()
+    show_notes()
+    os.environ["MPLBACKEND"] = "agg"  # figures are files: that of a notebook may not be installed here
     options = build_parser().parse_args(arguments)
     try:
         code = COMMANDS[options.command](options)
@@ -38,24 +48,37 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         # The reader of our output has gone, as in `circuittex new | head`: nobody is left to tell.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return BROKEN_PIPE
+        return ExitCode.BROKEN_PIPE
     except (CircuittexError, OSError) as error:
-        print("circuittex: error:", " ".join(str(error).split()), file=sys.stderr)
-        return BAD_INPUT
+        _complain("error", str(error))
+        return code_of(error)
     except KeyboardInterrupt:
         print(f"\ncircuittex: interrupted; {_kept(options)}", file=sys.stderr)
-        return INTERRUPTED
+        return ExitCode.INTERRUPTED
+    except Exception as error:
+        if os.environ.get(DEBUG):
+            raise
+        _complain(
+            "internal error",
+            f"{type(error).__name__}: {error}; this is a fault of circuittex: please report what {DEBUG}=1 shows",
+        )
+        return ExitCode.INTERNAL
     return code
 
 
-def _new(options: argparse.Namespace) -> int:
+def _complain(kind: str, text: str) -> None:
+    """One line on the standard error."""
+    print(f"circuittex: {kind}:", " ".join(text.split()), file=sys.stderr)
+
+
+def _new(options: argparse.Namespace) -> ExitCode:
     from circuittex.design import starter
 
-    print(starter(), end="")
-    return 0
+    write_utf8(sys.stdout, starter())
+    return ExitCode.DONE
 
 
-def _run(options: argparse.Namespace) -> int:
+def _run(options: argparse.Namespace) -> ExitCode:
     from circuittex.design import load_design
 
     design = load_design(options.design)
@@ -65,22 +88,40 @@ def _run(options: argparse.Namespace) -> int:
         from circuittex.results.summary import table
         from circuittex.study.run import run_study
 
-        study = run_study(
-            design,
-            options.out,
-            fresh=options.fresh,
-            error_estimate=options.error_estimate,
-            branches=options.branches,
-            workers=options.workers,
-            progress=progress,
-        )
+        try:
+            study = run_study(
+                design,
+                options.out,
+                fresh=options.fresh,
+                error_estimate=options.error_estimate,
+                branches=options.branches,
+                workers=options.workers,
+                progress=progress,
+            )
+        except ConvergenceError as error:
+            if not _count(options.out):
+                raise
+            _complain("error", f"{error}; {_kept(options)}")
+            return ExitCode.PARTLY
     if not options.quiet:
         print(table(study))
         print(f"\nreport: {options.out / 'report.html'}")
     if names := _disagreeing(study):
         print(f"circuittex: the routes DISAGREE in {', '.join(names)}: do not trust these results", file=sys.stderr)
-        return DISAGREE
-    return 0
+        return ExitCode.DISAGREE
+    if failed := _simulator_failed(study):
+        print(f"circuittex: ngspice failed in {', '.join(failed)}: see the report", file=sys.stderr)
+        return ExitCode.SIMULATOR
+    return ExitCode.DONE
+
+
+def _simulator_failed(study: Study) -> list[str]:
+    """Names of the states on which an ngspice that is there gave no answer."""
+    from circuittex.electrical.spice.ngspice import find_ngspice
+
+    if find_ngspice() is None:
+        return []
+    return [r.name for r in study.records if r.verification.routes and r.verification.simulator_failed]
 
 
 def _disagreeing(study: Study) -> list[str]:
@@ -90,14 +131,14 @@ def _disagreeing(study: Study) -> list[str]:
     return [record.name for record in study.records if record.verification.routes and not agrees(record)]
 
 
-def _netlist(options: argparse.Namespace) -> int:
+def _netlist(options: argparse.Namespace) -> ExitCode:
     if options.probe is not None and options.kind != "deck":
         raise DesignError("--probe", options.probe, f"only --kind deck is made for a probe, not {options.kind}")
     study = _load(options.results)
     (record,) = _select(study, options.state)
     text = _netlist_text(study, record, options)
     if options.out is None:
-        print(text, end="")
+        write_utf8(sys.stdout, text)
     else:
         options.out.write_text(text, encoding="ascii")
     from circuittex.electrical.spice.ngspice import estimated_seconds, feasible
@@ -106,7 +147,7 @@ def _netlist(options: argparse.Namespace) -> int:
     if not feasible(resistors):
         seconds = estimated_seconds(resistors)
         print(f"circuittex: note: {resistors} resistors may take ngspice {seconds:.0f} s or more", file=sys.stderr)
-    return 0
+    return ExitCode.DONE
 
 
 def _netlist_text(study: Study, record: Record, options: argparse.Namespace) -> str:
@@ -131,7 +172,7 @@ def _probe(design: Design, name: str | None) -> Probe:
     raise DesignError("--probe", name, f"probes: {', '.join(probe.name for probe in design.probes) or 'none'}")
 
 
-def _verify(options: argparse.Namespace) -> int:
+def _verify(options: argparse.Namespace) -> ExitCode:
     study = _load(options.results)
     records = _select(study, options.state)
     from circuittex.results.verification import AGREEMENT
@@ -139,21 +180,33 @@ def _verify(options: argparse.Namespace) -> int:
     from circuittex.study.verify import verify
 
     design = study.design
-    agree = True
+    checks = []
     print(f"{'state':<20} {'V per V':>8} {'current':>8} {'merging':>8} {'mesh':>8}  routes")
     for record in records:
         simple = simplified(design, record.contacts)
         check = verify(record.contacts, simple.contacts, design.terminals, design.probes)
         differences = check.max_voltage_difference, check.max_current_difference
-        agree &= check.ngspice_checked and check.agrees
+        checks.append(check)
         numbers = [*differences, check.merge_error, check.field_difference]
         shown = " ".join(f"{number:8.1e}" for number in numbers)
         print(f"{record.name:<20} {shown}  {', '.join(check.routes)} {check.note}".rstrip(), flush=True)
-    print(f"all routes agree to {AGREEMENT:.0e}" if agree else "NOT confirmed: see the notes above")
-    return 0 if agree else DISAGREE
+    code = _verdict(checks)
+    print(f"all routes agree to {AGREEMENT:.0e}" if code == ExitCode.DONE else "NOT confirmed: see the notes above")
+    return code
 
 
-def _report(options: argparse.Namespace) -> int:
+def _verdict(checks: Sequence[Verification]) -> ExitCode:
+    """What the checks of all states say together, the worst first."""
+    from circuittex.electrical.spice.ngspice import find_ngspice
+
+    if any(check.routes and not check.agrees for check in checks):
+        return ExitCode.DISAGREE
+    if all(check.ngspice_checked for check in checks):
+        return ExitCode.DONE
+    return ExitCode.NOT_CHECKED if find_ngspice() is None else ExitCode.SIMULATOR
+
+
+def _report(options: argparse.Namespace) -> ExitCode:
     folder = _results_file(options.results).parent
     _prepare(folder)
     from circuittex.base.lock import locked
@@ -165,7 +218,7 @@ def _report(options: argparse.Namespace) -> int:
         beside = _beside(options, study)
         write_summary(folder / "summary.json", study)
         print(write_report(folder, study, beside))
-    return 0
+    return ExitCode.DONE
 
 
 def _beside(options: argparse.Namespace, study: Study) -> tuple[Study, ...]:
@@ -182,7 +235,7 @@ def _beside(options: argparse.Namespace, study: Study) -> tuple[Study, ...]:
     return (other,)
 
 
-def _ensemble(options: argparse.Namespace) -> int:
+def _ensemble(options: argparse.Namespace) -> ExitCode:
     from circuittex.study.ensemble.command import closing_words, ensemble_command, folder_of, warnings
 
     _prepare(folder_of(options))
@@ -192,10 +245,16 @@ def _ensemble(options: argparse.Namespace) -> int:
         print(closing_words(ensemble, folder_of(options)))
     for line in warnings(ensemble):
         print("circuittex:", line, file=sys.stderr)
-    return DISAGREE if any(ensemble.disagreeing) else 0
+    if any(ensemble.disagreeing):
+        return ExitCode.DISAGREE
+    failed = sum(map(bool, ensemble.failures))
+    if failed == len(ensemble.failures):
+        _complain("error", f"all {failed} members failed")
+        return ExitCode.NO_EQUILIBRIUM
+    return ExitCode.PARTLY if failed else ExitCode.DONE
 
 
-COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
+COMMANDS: dict[str, Callable[[argparse.Namespace], ExitCode]] = {
     "new": _new,
     "run": _run,
     "netlist": _netlist,
@@ -203,37 +262,6 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "report": _report,
     "ensemble": _ensemble,
 }
-
-
-class Progress:
-    """Shows what is being done: one updating line on a terminal, plain lines elsewhere.
-
-    A text that ends with a line break stays on the terminal.
-    """
-
-    def __init__(self, stream: TextIO, *, show: bool = True) -> None:
-        self._stream, self._show = stream, show
-        self._updating = stream.isatty()
-
-    def __call__(self, text: str) -> None:
-        """Show `text`, which is one line."""
-        if not self._show:
-            return
-        if text.endswith("\n") or not self._updating:
-            start = "\r\x1b[2K" if self._updating else ""
-            self._stream.write(f"{start}{text.rstrip()}\n")
-        else:
-            width = shutil.get_terminal_size().columns - 1
-            self._stream.write(f"\r\x1b[2K{text[:width]}")
-        self._stream.flush()
-
-    def __enter__(self) -> Progress:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._show and self._updating:
-            self._stream.write("\r\x1b[2K")
-            self._stream.flush()
 
 
 def _prepare(folder: Path) -> None:
@@ -279,11 +307,16 @@ def _kept(options: argparse.Namespace) -> str:
         return "finished members and states are kept; the same command goes on from there"
     if options.command != "run":
         return "results that were there before are unchanged"
-    try:
-        count = len(_load(options.out).records)
-    except StoreError:
-        count = 0
+    count = _count(options.out)
     if count == 0:
         return "no state was finished"
     states = "1 finished state is" if count == 1 else f"{count} finished states are"
     return f"{states} kept in {options.out / RESULTS}; the same command goes on from there"
+
+
+def _count(folder: Path) -> int:
+    """How many states are kept in a results folder."""
+    try:
+        return len(_load(folder).records)
+    except StoreError:
+        return 0

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from circuittex.base.version import __version__
+from circuittex.command.exit_codes import table
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -26,7 +27,7 @@ def build_parser() -> argparse.ArgumentParser:
             "  circuittex new > weave.toml\n"
             "  circuittex run weave.toml --out results/weave\n"
             "then open results/weave/report.html. 'circuittex COMMAND --help' explains a command.\n\n"
-            "exit codes: 0 done, 1 routes disagree ('run', 'verify'), 2 unusable input, 130 interrupted"
+            f"exit codes:\n{table()}"
         ),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -80,7 +81,7 @@ def _add_run(commands: Commands) -> None:
         "for ParaView. States are written one by one: however a run ends, the same command goes on from the\n"
         "states that are finished, with the same numbers. Loading paths are computed beside one another, as far\n"
         "as there are cores. Results of another design in DIR are refused, and so is a DIR that another run is\n"
-        "writing to. Exit code 1 where routes differ by more than 1e-9; without ngspice the run completes and\n"
+        "writing to. Exit code 5 where routes differ by more than 1e-9; without ngspice the run completes and\n"
         "says that it did not check.",
         "circuittex run examples/plain_weave.toml --out results/plain_weave",
     )
@@ -149,8 +150,8 @@ def _add_verify(commands: Commands) -> None:
         "verify",
         "check computed states again: finite elements, nodal solution, ngspice",
         "Solves every recorded state again by all three routes and prints the largest differences of node\n"
-        "voltages and terminal currents. Exit code 1 where routes differ by more than 1e-9 or ngspice did not\n"
-        "answer. Changes nothing in the folder.",
+        "voltages and terminal currents. Exit code 5 where routes differ by more than 1e-9, 8 without\n"
+        "ngspice, 9 where ngspice failed. Changes nothing in the folder.",
         "circuittex verify results/plain_weave --state relaxed",
     )
     _add_results(parser)

@@ -137,13 +137,21 @@ class Design:
     name: str
     """A title: any text without control characters."""
     weave: Weave
+    """The textile."""
     contact: ContactLaw
+    """How its fibrils touch."""
     loading: tuple[Loading, ...] = ()
+    """The loading paths, each from the relaxed state."""
     terminals: tuple[Terminal, ...] = ()
+    """Yarn ends whose fibril ends are joined."""
     probes: tuple[Probe, ...] = ()
+    """What is measured between terminals."""
     electrical: Electrical = Electrical()
+    """Choices of the electrical model."""
     numerics: Numerics = Numerics()
+    """Choices of the discretisation and of the solver."""
     packing: Packing = Packing()
+    """Random departures from the regular packing."""
 
     def __post_init__(self) -> None:
         title(self.name, "name")

@@ -38,6 +38,8 @@ class Verification:
     """Whether ngspice answered every probe and its answers were compared."""
     note: str
     """What a reader must know, such as why ngspice did not check or that routes disagree; empty if all is well."""
+    simulator_failed: bool = False
+    """Whether an ngspice that is there was asked and gave no answer; False where there is none."""
 
     @property
     def agrees(self) -> bool:

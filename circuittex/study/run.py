@@ -32,6 +32,7 @@ from circuittex.study.folder import (
 )
 from circuittex.study.plan import RELAXED, plan
 from circuittex.study.record import reach
+from circuittex.study.rest import Rest
 from circuittex.study.schedule import compute
 
 Say = Callable[[str], None]
@@ -109,24 +110,24 @@ def _in_folder(
     total, kept = len(plan(study.design)), len(study.records)
     if kept:
         say(f"{kept} of {total} states are there already\n")
+    rest = Rest(total, kept, say)
 
     def keep(so_far: Study, record: Record) -> Study:
-        nonlocal kept
         so_far = keep_record(folder, so_far, record)
-        kept += 1
+        rest.done()
         write_state(folder, so_far, record)
         write_numbers(folder, so_far)
         return so_far
 
     try:
-        study = _compute(study, workers, solver, say, keep)
+        study = _compute(study, workers, solver, rest, keep)
         study = _examine(study, jobs(study), workers, say, partial(keep_finding, folder))
         if needs_report(folder):
             say("figures and report")
         complete(folder, study)
     except (OSError, StoreError) as error:
         raise StoreError(
-            f"{error}; {kept} of {total} states are kept in {folder}, and the same call goes on from there"
+            f"{error}; {rest.kept} of {total} states are kept in {folder}, and the same call goes on from there"
         ) from error
     return study
 

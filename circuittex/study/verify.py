@@ -10,7 +10,7 @@ from typing import ParamSpec, TypeVar
 import numpy as np
 
 from circuittex.base.arrays import Floats
-from circuittex.base.errors import NgspiceError
+from circuittex.base.errors import NgspiceError, NgspiceUnavailableError
 from circuittex.base.frozen import frozen
 from circuittex.contact.state import ContactState
 from circuittex.design import Probe, Terminal
@@ -73,13 +73,14 @@ def verify(
     routes = dict(zip(("fields", "nodal"), answers, strict=True))
     yarn = _yarn_currents(contacts, probes)
     native = _difference(full_fields, full_nodal, yarn), _difference(answers[0], answers[1], yarn)
-    note, limit, with_ngspice = "", 0.0, []
+    note, limit, with_ngspice, failed = "", 0.0, [], False
     try:
         routes["ngspice"] = clock("ngspice", _ngspice, circuits, probes, timeout)
         limit = _ngspice_limit(circuits, probes, routes["nodal"], yarn)
         with_ngspice = [_difference(answer, routes["ngspice"], yarn) for answer in answers]
     except NgspiceError as error:
         note = f"ngspice did not check this state: {error}"
+        failed = not isinstance(error, NgspiceUnavailableError)
     voltage, current = np.max([*native, *with_ngspice], axis=0)
     found = Verification(
         routes=tuple(routes),
@@ -94,6 +95,7 @@ def verify(
         ngspice_seconds=clock.seconds["ngspice"] if "ngspice" in routes else float("nan"),
         ngspice_checked="ngspice" in routes,
         note=note,
+        simulator_failed=failed,
     )
     return replace(found, note=_note(found))
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from circuittex.base.arrays import Floats
-from circuittex.base.errors import NgspiceError
+from circuittex.base.errors import NgspiceError, NgspiceUnavailableError
 from circuittex.base.frozen import frozen
 
 VARIABLE = "CIRCUITTEX_NGSPICE"
@@ -125,13 +125,15 @@ def run_decks(decks: Sequence[str], timeout: float = 60.0) -> tuple[RawData, ...
     killed with everything it started after `timeout` seconds. ngspice ends with status 0 even where it found
     no answer; so the log must be free of complaints and every raw file complete and finite.
 
-    Raises NgspiceError where ngspice is missing, is not feasible for decks of this size in that time,
-    complains, crashes, hangs, or answers rubbish; OSError where the disk with the temporary folder is full, which says
-    nothing about ngspice and passes.
+    Raises NgspiceUnavailableError where ngspice is missing or is not feasible for decks of this size in that time;
+    NgspiceError where it complains, crashes, hangs, or answers rubbish; OSError where the disk with the temporary
+    folder is full, which says nothing about ngspice and passes.
     """
     executable = find_ngspice()
     if executable is None:
-        raise NgspiceError(f"ngspice was not found: neither {VARIABLE} nor PATH leads to one that can be run")
+        raise NgspiceUnavailableError(
+            f"ngspice was not found: neither {VARIABLE} nor PATH leads to one that can be run"
+        )
     _check_size(decks, timeout)
     try:
         with tempfile.TemporaryDirectory(prefix="circuittex-", ignore_cleanup_errors=True) as folder:
@@ -223,7 +225,7 @@ def _check_size(decks: Sequence[str], timeout: float) -> None:
     sizes = [len(re.findall(r"^r", deck, re.MULTILINE | re.IGNORECASE)) for deck in decks]
     seconds = sum(map(estimated_seconds, sizes))
     if seconds > timeout:
-        raise NgspiceError(
+        raise NgspiceUnavailableError(
             f"ngspice would need about {seconds:.0f} s for {sum(sizes)} resistors in {len(decks)} deck(s), more than "
             f"the {timeout:g} s allowed; circuittex.solve_nodal solves such circuits in seconds"
         )

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
+from typing import Any
+
+from markupsafe import Markup
 
 from circuittex.results.bifurcation import (
     ALLOWED,
@@ -13,7 +15,8 @@ from circuittex.results.bifurcation import (
     force_difference,
 )
 from circuittex.results.outcome import Outcome
-from circuittex.results.report.table import number, table
+from circuittex.results.report.number import number
+from circuittex.results.report.template import render
 
 _INTRODUCTION = (
     "Each state was reached once more from the recorded state before it, with the fibrils in another order. That "
@@ -29,34 +32,32 @@ DIGITS = 8
 _WHICH = ("recorded", "other")
 
 
-def branch_alarm(checks: Sequence[BranchCheck]) -> str:
+def branch_alarm(checks: Sequence[BranchCheck]) -> Markup:
     """A box for the head of the page, as HTML; nothing where no check found anything to be told there.
 
-    >>> branch_alarm(())
+    >>> str(branch_alarm(()))
     ''
     """
-    sentences = branch_statement([check for check in checks if check.alarming])
-    return f'<div class="bad">{"".join(f"<p>{escape(text)}</p>" for text in sentences)}</div>' if sentences else ""
+    return render("alarm.html", sentences=branch_statement([check for check in checks if check.alarming]))
 
 
-def branch_section(checks: Sequence[BranchCheck], probes: Sequence[str]) -> str:
+def branch_section(checks: Sequence[BranchCheck], probes: Sequence[str]) -> Markup:
     """The section as HTML; nothing without checks. `probes` are the names of the currents.
 
-    >>> branch_section((), ())
+    >>> str(branch_section((), ()))
     ''
     """
     if not checks:
-        return ""
+        return Markup()
     head = ["state", "clamp forces (relative)", "currents (relative)", "relaxed further (relative)"]
-    head += ["energy (N mm)", "largest distance (mm)", "verdict"]
-    rows = table(head, [_row(check) for check in checks])
-    boxes = "".join(_both(check, probes) for check in checks if check.bifurcation)
-    reasons = "".join(
-        f'<p class="bad">{escape(f"{check.state}: {check.verdict} ({check.trouble})")}</p>'
-        for check in checks
-        if check.trouble
+    return render(
+        "branches.html",
+        introduction=_INTRODUCTION,
+        head=[*head, "energy (N mm)", "largest distance (mm)", "verdict"],
+        rows=[_row(check) for check in checks],
+        bifurcations=[_both(check, probes) for check in checks if check.bifurcation],
+        troubles=[f"{check.state}: {check.verdict} ({check.trouble})" for check in checks if check.trouble],
     )
-    return f'<h2>Branches</h2><p>{escape(_INTRODUCTION)}</p><div class="numbers">{rows}</div>{boxes}{reasons}'
 
 
 def _row(check: BranchCheck) -> list[str]:
@@ -66,20 +67,15 @@ def _row(check: BranchCheck) -> list[str]:
     return [check.state, *(number(value, 2) for value in values), check.verdict]
 
 
-def _both(check: BranchCheck, probes: Sequence[str]) -> str:
+def _both(check: BranchCheck, probes: Sequence[str]) -> dict[str, Any]:
     """The two branches of a bifurcation side by side."""
     names = [f"{side} F{axis} (N)" for side in ("warp +x", "weft +y") for axis in "xyz"]
     names += [*(f"I {probe} (A)" for probe in probes), "Ry (Ω)", "Rc (Ω)", "stored energy (N mm)"]
     head = ["", "recorded branch", "other branch", *(f"{which}, relaxed further" for which in _WHICH if check.settled)]
     outcomes = check.recorded, check.again, *check.settled
     columns = ([number(value, DIGITS) for value in _values(outcome)] for outcome in outcomes)
-    both = table(head, list(zip(names, *columns, strict=True)))
-    words = (
-        "The order of the fibrils decides which of these two equilibria is reached; their nodes are up to "
-        f"{number(check.moved, 2)} mm apart. Neither is more right than the other, and what follows on the loading "
-        "path rests on the recorded one."
-    )
-    return f'<div class="bad"><h3>Bifurcation in {escape(check.state)}</h3><p>{words}</p>{both}</div>'
+    rows = list(zip(names, *columns, strict=True))
+    return {"state": check.state, "moved": number(check.moved, 2), "head": head, "rows": rows}
 
 
 def _values(outcome: Outcome) -> list[float]:

@@ -3,31 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
+from typing import Any
+
+from markupsafe import Markup
 
 from circuittex.results.discretisation import ErrorEstimate, QuantityError
-from circuittex.results.report.table import number, table
-
-_INTRODUCTION = (
-    "Estimated from the same equilibrium on half and on twice as many elements and with twice as many contact points: "
-    "an estimate, not a bound. The error is the sum of the parts of the mesh and of the contact points. A dash as "
-    "order means that the values on the three meshes do not run one way; the estimate then rests on their differences "
-    "alone."
-)
+from circuittex.results.report.number import number
+from circuittex.results.report.template import render
 
 
-def error_section(estimates: Sequence[ErrorEstimate]) -> str:
+def error_section(estimates: Sequence[ErrorEstimate]) -> Markup:
     """The section as HTML; nothing without estimates.
 
-    >>> error_section(())
+    >>> str(error_section(()))
     ''
     """
-    if not estimates:
-        return ""
-    return f"<h2>Discretisation errors</h2><p>{_INTRODUCTION}</p>{''.join(map(_state, estimates))}"
+    return render("errors.html", estimates=[_state(each) for each in estimates]) if estimates else Markup()
 
 
-def _state(estimate: ErrorEstimate) -> str:
+def _state(estimate: ErrorEstimate) -> dict[str, Any]:
     coarse, own, fine = estimate.elements
     points, more = estimate.contact_points
     head = [
@@ -40,9 +34,8 @@ def _state(estimate: ErrorEstimate) -> str:
         "order",
     ]
     head += [f"{coarse} elements", f"{fine} elements", f"{more} points"]
-    warnings = "".join(f'<p class="bad">{escape(text)}</p>' for text in estimate.warnings)
-    rows = table(head, [_row(quantity) for quantity in estimate.quantities])
-    return f'<h3>{escape(estimate.state)}</h3>{warnings}<div class="numbers">{rows}</div>'
+    rows = [_row(quantity) for quantity in estimate.quantities]
+    return {"state": estimate.state, "warnings": estimate.warnings, "head": head, "rows": rows}
 
 
 def _row(quantity: QuantityError) -> list[str]:

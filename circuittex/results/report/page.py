@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
-from html import escape
 from pathlib import Path
-from string import Template
+from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from circuittex.base.atomic import write_text
 from circuittex.results.claims.table import Table, claims_table
@@ -19,10 +19,9 @@ from circuittex.results.report.captions import captions
 from circuittex.results.report.claims import claims_section
 from circuittex.results.report.energy import energy_section
 from circuittex.results.report.errors import error_section
-from circuittex.results.report.frame import PAGE
+from circuittex.results.report.number import number as _number
 from circuittex.results.report.parameters import parameters
-from circuittex.results.report.table import number as _number
-from circuittex.results.report.table import table as _table
+from circuittex.results.report.template import render, table
 from circuittex.results.soundness import deepest_overlap, doubt_statement, section_stress
 from circuittex.results.summary import agrees, confirmed, difference, effort, insulated_resistance, ngspice_statement
 from circuittex.results.verification import AGREEMENT
@@ -44,35 +43,35 @@ def write_report(folder: str | Path, study: Study, beside: Sequence[Study] = ())
 
 def page(study: Study, pictures: Mapping[str, bytes], beside: Sequence[Study] = ()) -> str:
     """The whole page as text; `pictures` are PNG files by the names of `circuittex.results.plot.FIGURES`."""
-    shown = {f"figure_{name}": _figure(text, pictures.get(name)) for name, text in captions(study).items()}
     claims = claims_table([study, *beside])
-    return Template(PAGE).substitute(
-        shown,
-        title=escape(study.design.name),
-        facts=_facts(study, claims),
-        verdict=_verdict(study),
-        alarm=branch_alarm(study.branches),
-        states=_states(study),
-        network=_network(study),
-        claims=claims_section(claims),
-        branches=branch_section(study.branches, [probe.name for probe in study.design.probes]),
-        errors=error_section(study.errors),
-        verification=_verification(study),
-        parameters=parameters(study.design),
-        version=escape(study.version),
+    kind, sentences = _verdict(study)
+    return str(
+        render(
+            "report.html",
+            figures={name: picture(text, pictures.get(name)) for name, text in captions(study).items()},
+            title=study.design.name,
+            known=_facts(study, claims),
+            kind=kind,
+            sentences=sentences,
+            alarm=branch_alarm(study.branches),
+            states=_states(study),
+            network=_network(study),
+            claims=claims_section(claims),
+            branches=branch_section(study.branches, [probe.name for probe in study.design.probes]),
+            errors=error_section(study.errors),
+            verification=_verification(study),
+            parameters=parameters(study.design),
+            version=study.version,
+        )
     )
 
 
-def _figure(caption: str, png: bytes | None) -> str:
-    if png is None:
-        return ""
-    data = base64.b64encode(png).decode("ascii")
-    caption = escape(caption)
-    image = f'<img alt="{caption}" src="data:image/png;base64,{data}">'
-    return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
+def picture(caption: str, png: bytes | None) -> dict[str, str | None]:
+    """What a template needs of a figure: its caption, and the picture as text; none where it was not drawn."""
+    return {"caption": caption, "data": None if png is None else base64.b64encode(png).decode("ascii")}
 
 
-def _facts(study: Study, claims: Table | None) -> str:
+def _facts(study: Study, claims: Table | None) -> dict[str, str]:
     mesh = study.mesh
     facts = {
         "Design": study.design.name,
@@ -86,13 +85,13 @@ def _facts(study: Study, claims: Table | None) -> str:
         facts["Contact points"] = f"{study.records[0].contacts.n_contacts} in state {study.records[0].name}"
     if claims is not None:
         facts |= {f"Claims of the paper, {name}": text for name, text in zip(claims.columns, claims.tally, strict=True)}
-    return "<dl>" + "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in facts.items()) + "</dl>"
+    return facts
 
 
-def _verdict(study: Study) -> str:
-    """Whether the routes agree and ngspice took part, and what to doubt, as a box that cannot be overlooked."""
+def _verdict(study: Study) -> tuple[str, list[str]]:
+    """Whether the routes agree, ngspice took part and nothing is to be doubted, for a box that cannot be overlooked."""
     if not study.records:
-        return '<p class="bad">No state has been recorded: there are no results yet.</p>'
+        return "bad", ["No state has been recorded: there are no results yet."]
     sentences = list(ngspice_statement(study))
     if study.design.probes:
         worst = float(np.max([difference(record) for record in study.records]))  # nan if any is
@@ -103,12 +102,11 @@ def _verdict(study: Study) -> str:
             f"difference in any state is {worst:.1e} (at most {AGREEMENT:.0e} is required).",
         )
     doubtful = doubt_statement(study)
-    sentences += doubtful
-    kind = "good" if all(confirmed(record) for record in study.records) and not doubtful else "bad"
-    return f'<div class="{kind}">' + "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences) + "</div>"
+    good = all(confirmed(record) for record in study.records) and not doubtful
+    return "good" if good else "bad", [*sentences, *doubtful]
 
 
-def _states(study: Study) -> str:
+def _states(study: Study) -> Markup:
     probes = [f"I {probe.name} (A)" for probe in study.design.probes]
     head = ["state", "strain", *probes, "peak temperature rise (K)"]
     rows = [
@@ -120,20 +118,23 @@ def _states(study: Study) -> str:
         ]
         for record in study.records
     ]
-    return (
-        f"{_table(head, rows)}<h3>Clamp forces</h3>{_forces(study)}<h3>Equilibrium</h3>{_equilibrium(study)}"
-        f"{energy_section(study)}"
-        if rows
-        else "<p>No state has been recorded.</p>"
+    return render(
+        "states.html",
+        states={"head": head, "rows": rows},
+        forces=_forces(study),
+        equilibrium=_equilibrium(study),
+        effort=effort(study),
+        energy=energy_section(study),
     )
 
 
-def _forces(study: Study) -> str:
+def _forces(study: Study) -> dict[str, Any]:
     head = ["state", *(f"{side} F{axis} (N)" for side in ("warp +x", "weft +y") for axis in "xyz")]
-    return _table(head, [[r.name, *(f"{force:.4f}" for force in r.clamp_force.ravel())] for r in study.records])
+    rows = [[r.name, *(f"{force:.4f}" for force in r.clamp_force.ravel())] for r in study.records]
+    return {"head": head, "rows": rows}
 
 
-def _equilibrium(study: Study) -> str:
+def _equilibrium(study: Study) -> dict[str, Any]:
     head = ["state", "largest free force (N)", "Newton iterations", "parts", "levels", "contact points"]
     head += ["deepest overlap / (R + R')", "largest stress (MPa)", "netlist"]
     rows = [
@@ -147,28 +148,31 @@ def _equilibrium(study: Study) -> str:
         ]
         for r in study.records
     ]
-    return _table(head, rows) + "".join(f"<p>{escape(sentence)}</p>" for sentence in effort(study))
+    return {"head": head, "rows": rows}
 
 
-def _network(study: Study) -> str:
+def _network(study: Study) -> Markup:
     if not study.records:
-        return ""
+        return Markup()
     rows = [
         [r.name, _number(r.fit.Ry), _number(r.fit.Rc), f"{r.fit.residual:.2e}", "; ".join(r.fit.warnings) or "none"]
         for r in study.records
     ]
-    table = _table(["state", "Ry (Ω)", "Rc (Ω)", "misfit", "warnings"], rows)
-    weighting = escape(study.records[0].fit.weighting)
-    insulated = _number(insulated_resistance(study.mesh))
-    return f"{table}<p>Weighting of the fit: {weighting}. Ry of the same yarns without contacts: {insulated} Ω.</p>"
+    return render(
+        "network.html",
+        head=["state", "Ry (Ω)", "Rc (Ω)", "misfit", "warnings"],
+        rows=rows,
+        weighting=study.records[0].fit.weighting,
+        insulated=_number(insulated_resistance(study.mesh)),
+    )
 
 
-def _verification(study: Study) -> str:
+def _verification(study: Study) -> Markup:
     if not study.records:
-        return ""
+        return Markup()
     head = ["state", "routes", "voltages (V per V)", "currents (relative)"]
     head += ["reduced network", "merging", "mechanical mesh", "ngspice", "time (s)"]
-    return _table(head, [_verification_row(record) for record in study.records])
+    return table(head, [_verification_row(record) for record in study.records])
 
 
 def _verification_row(record: Record) -> list[str]:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
-from html import escape
 from itertools import groupby
+from typing import Any
+
+from markupsafe import Markup
 
 from circuittex.design import Design, Weave
-from circuittex.results.report.table import number, table
+from circuittex.results.report.number import number
+from circuittex.results.report.template import render
 
 
-def parameters(design: Design) -> str:
+def parameters(design: Design) -> Markup:
     """The tables of all settings as HTML; the packing where it is not the regular one."""
     yarns = dict.fromkeys(design.weave.warp + design.weave.weft)
     materials = dict.fromkeys(material for yarn in yarns for material in yarn.materials)
@@ -22,7 +25,7 @@ def parameters(design: Design) -> str:
             for yarn in yarns
         ),
         *(_settings(f"Material {material.name}", material, skip=("name",)) for material in materials),
-        "" if design.packing.regular else _settings("Random packing", design.packing),
+        *([] if design.packing.regular else [_settings("Random packing", design.packing)]),
         _settings("Contact", design.contact),
         _settings("Electrical", design.electrical),
         _settings("Numerics", design.numerics),
@@ -30,19 +33,16 @@ def parameters(design: Design) -> str:
         _terminals(design),
         _probes(design),
     ]
-    return "".join(parts)
+    return render("parameters.html", parts=[part for part in parts if part["rows"]])
 
 
-def _weave(weave: Weave) -> str:
+def _weave(weave: Weave) -> dict[str, Any]:
     kinds = {side: runs(yarn.name for yarn in getattr(weave, side)) for side in ("warp", "weft")}
     draft = "\n".join(" ".join("■" if over else "□" for over in row) for row in weave.draft[::-1])
-    legend = "A row is a warp yarn (the last at the top), a column a weft yarn; ■: the warp passes over."
-    return f"{_settings('Weave', weave, kinds, skip=('draft',))}<h3>Draft</h3><pre>{draft}</pre><p>{legend}</p>"
+    return _settings("Weave", weave, kinds, skip=("draft",)) | {"draft": draft}
 
 
-def _loading(design: Design) -> str:
-    if not design.loading:
-        return ""
+def _loading(design: Design) -> dict[str, Any]:
     head = ["path", "states", "strain", "last average deformation gradient", "ends let go"]
     rows = [
         [
@@ -54,23 +54,23 @@ def _loading(design: Design) -> str:
         ]
         for path in design.loading
     ]
-    return f"<h3>Loading</h3>{table(head, rows)}"
+    return _part("Loading", head, rows)
 
 
-def _terminals(design: Design) -> str:
+def _terminals(design: Design) -> dict[str, Any]:
     rows = [
         [terminal.name, ", ".join(yarn + ("+" if side > 0 else "-") for yarn, side in terminal.ends)]
         for terminal in design.terminals
     ]
-    return f"<h3>Terminals</h3>{table(['terminal', 'yarn ends'], rows)}" if rows else ""
+    return _part("Terminals", ["terminal", "yarn ends"], rows)
 
 
-def _probes(design: Design) -> str:
+def _probes(design: Design) -> dict[str, Any]:
     rows = [[probe.name, probe.source, probe.sink, number(probe.voltage)] for probe in design.probes]
-    return f"<h3>Probes</h3>{table(['probe', 'source', 'sink', 'voltage (V)'], rows)}" if rows else ""
+    return _part("Probes", ["probe", "source", "sink", "voltage (V)"], rows)
 
 
-def _settings(title: str, part: object, said: dict[str, str] | None = None, skip: Sequence[str] = ()) -> str:
+def _settings(title: str, part: object, said: dict[str, str] | None = None, skip: Sequence[str] = ()) -> dict[str, Any]:
     """The fields of a part of the design, those of `said` in these words."""
     words = said or {}
     rows = [
@@ -78,7 +78,11 @@ def _settings(title: str, part: object, said: dict[str, str] | None = None, skip
         for field in fields(part)  # type: ignore[arg-type]
         if field.name not in skip
     ]
-    return f"<h3>{escape(title)}</h3>{table(['setting', 'value in base units'], rows)}"
+    return _part(title, ["setting", "value in base units"], rows)
+
+
+def _part(title: str, head: list[str], rows: list[list[str]]) -> dict[str, Any]:
+    return {"title": title, "head": head, "rows": rows, "draft": ""}
 
 
 def runs(names: Iterable[str]) -> str:

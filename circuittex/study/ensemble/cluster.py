@@ -36,12 +36,18 @@ _Result = TypeVar("_Result")
 
 @contextlib.contextmanager
 def local_client(workers: int) -> Iterator[Client]:
-    """A client of `workers` processes on this machine, which end with the block at once, whatever they are doing."""
+    """A client of `workers` processes on this machine, which end with the block at once, whatever they are doing.
+
+    Dask's ports run the code of whoever connects, and on a machine with several users anybody can. So scheduler and
+    workers speak TLS alone, with a certificate that is made here, kept in memory and known to them only.
+    """
     distributed = _distributed()
     import dask
 
     with dask.config.set(SETTINGS):
         cluster = distributed.LocalCluster(
+            protocol="tls://",
+            security=distributed.Security.temporary(),
             n_workers=workers,
             threads_per_worker=1,
             processes=True,

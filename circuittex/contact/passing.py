@@ -29,6 +29,7 @@ CHORDS = 4
 COLLISION = 1 / 4
 """Part of the first distance, or of R + R' if that is less, at which two centre lines count as having met. It leaves
 room for the line search, which goes by energies, to come back."""
+_WEIGHTS = np.einsum("kap,tp->kta", BASIS, np.linspace(0.0, 1.0, CHORDS + 1)[:, None] ** np.arange(4))
 CLOSEST = 1 / 8
 """How close the advancement comes to the collision, in parts of it: it would never end at the place itself."""
 MOST_ADVANCES = 200
@@ -54,9 +55,24 @@ class SafeStep:
 
 def chords(table: CurveTable, r: Floats) -> Floats:
     """(I, CHORDS + 1, 3) the points between the chords of every interval; r (N, 3) nodes."""
-    t = np.linspace(0.0, 1.0, CHORDS + 1)
-    weights = np.einsum("kap,tp->kta", BASIS, t[:, None] ** np.arange(4))
-    return np.asarray(np.einsum("ita,iac->itc", weights[table.kind], r[table.window[:, None] + np.arange(4)]))
+    points = np.empty((len(table.fibril), CHORDS + 1, 3))
+    _evaluate(_WEIGHTS, table.kind, table.window, r, points)
+    return points
+
+
+@compiled
+def _evaluate(weights: Any, kind: Any, window: Any, r: Any, points: Any) -> None:
+    """Fill points (I, T, 3) with the curve where its nodes have the weights (kind, T, 4)."""
+    for i in range(points.shape[0]):
+        w, first = weights[kind[i]], window[i]
+        for t in range(points.shape[1]):
+            for k in range(3):
+                points[i, t, k] = (
+                    w[t, 0] * r[first, k]
+                    + w[t, 1] * r[first + 1, k]
+                    + w[t, 2] * r[first + 2, k]
+                    + w[t, 3] * r[first + 3, k]
+                )
 
 
 def safe_step(table: CurveTable, radius: Floats, r: Floats, motion: Floats) -> SafeStep:
@@ -81,8 +97,10 @@ def safe_step(table: CurveTable, radius: Floats, r: Floats, motion: Floats) -> S
     high = np.maximum(start, end).max(axis=1) + reach
     axis = int(np.argmax(np.ptp(low, axis=0)))
     order = np.argsort(low[:, axis], kind="stable")
+    turned = np.roll(np.arange(3), -axis)  # the axis of the sweep first
+    low, high = (np.ascontiguousarray(box[order][:, turned]) for box in (low, high))
     found = np.array([1.0, 0.0, 0.0, np.inf])
-    _sweep(order, axis, low, high, table.fibril, radius, start, way, found)
+    _sweep(order, low, high, table.fibril, radius, start, way, found)
     pair = sorted(found[1:3].astype(int).tolist())
     return SafeStep(float(found[0]), (pair[0], pair[1]), float(found[3]))
 
@@ -171,23 +189,23 @@ def _safe_part(p: Any, u: Any, q: Any, v: Any, touch: float, work: Any, first: A
 
 
 @compiled
-def _sweep(
-    order: Any, axis: int, low: Any, high: Any, fibril: Any, radius: Any, start: Any, way: Any, found: Any
-) -> None:
+def _sweep(order: Any, low: Any, high: Any, fibril: Any, radius: Any, start: Any, way: Any, found: Any) -> None:
     """The least safe part of all pairs of chords of different fibrils, with the pair and its distance, in found (4,).
 
-    order (I,): the intervals by the lower end along `axis` of the boxes low, high (I, 3) that they sweep.
+    order (I,): the intervals by the lower end along the first axis of the boxes that they sweep; these boxes low, high
+    (I, 3) stand in that order.
     """
     work, first = np.empty((4, 3)), np.empty(1)
     for n in range(order.shape[0]):
         i = order[n]
+        f, ends, x, y, z, w = fibril[i], high[n, 0], low[n, 1], high[n, 1], low[n, 2], high[n, 2]
         for m in range(n + 1, order.shape[0]):
-            j = order[m]
-            if low[j, axis] > high[i, axis]:
+            if low[m, 0] > ends:
                 break
-            if fibril[i] == fibril[j] or not _overlap(low[i], high[i], low[j], high[j]):
+            if low[m, 1] > y or high[m, 1] < x or low[m, 2] > w or high[m, 2] < z or fibril[order[m]] == f:
                 continue
-            touch = radius[fibril[i]] + radius[fibril[j]]
+            j = order[m]
+            touch = radius[f] + radius[fibril[j]]
             for a in range(start.shape[1] - 1):
                 for b in range(start.shape[1] - 1):
                     p, u = start[i, a : a + 2], way[i, a : a + 2]
@@ -196,16 +214,7 @@ def _sweep(
                         continue
                     part = _safe_part(p, u, q, v, touch, work, first)
                     if part < found[0]:
-                        found[0], found[1], found[2], found[3] = part, fibril[i], fibril[j], first[0]
-
-
-@compiled
-def _overlap(low: Any, high: Any, other_low: Any, other_high: Any) -> bool:
-    """Whether two boxes overlap."""
-    apart = False
-    for k in range(3):
-        apart |= low[k] > other_high[k] or other_low[k] > high[k]
-    return not apart
+                        found[0], found[1], found[2], found[3] = part, f, fibril[j], first[0]
 
 
 @compiled

@@ -61,7 +61,7 @@ def advance(
         try:
             start = move(now, gradient, target)
             equilibrium = relax(mesh, design, start, before=now, free=free, solver=solver, report=report)
-            check_sides(mesh, design, equilibrium.configuration.r, target, free)
+            check_sides(mesh, design, equilibrium.configuration.r, target, free, equilibrium.history)
         except ConvergenceError as error:
             iterations += max(0, len(error.history) - 1)
             if size == SMALLEST:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from circuittex.base.arrays import Floats, Ints
@@ -15,10 +17,13 @@ from circuittex.geometry.mesh import FibrilMesh, pair_label
 REST = np.eye(2)
 
 
-def check_sides(mesh: FibrilMesh, design: Design, r: Floats, gradient: Floats, free: str = "") -> None:
+def check_sides(
+    mesh: FibrilMesh, design: Design, r: Floats, gradient: Floats, free: str = "", history: Any = ()
+) -> None:
     """Refuse nodes r (N, 3) at which fibrils have passed through one another or slipped off one another's ends.
 
-    `gradient` (2, 2) is the average one from the start to r; yarns along `free`, 'x' or 'y', have free ends.
+    `gradient` (2, 2) is the average one from the start to r; yarns along `free`, 'x' or 'y', have free ends; `history`
+    is that of the descent which led there, for the error.
 
     Raises `PenetrationError`, with one sentence that names the first pair and the likely cause.
     """
@@ -38,7 +43,7 @@ def check_sides(mesh: FibrilMesh, design: Design, r: Floats, gradient: Floats, f
             "do not cross any more: one has slipped off the other's end",
             "the cell is too small for that load",
         )
-    raise PenetrationError(f"{pair_label(mesh, first, second)} {what}{others}; {cause}")
+    raise PenetrationError(f"{pair_label(mesh, first, second)} {what}{others}; {cause}", history)
 
 
 def passed_through(mesh: FibrilMesh, design: Design, r: Floats, gradient: Floats, free: str = "") -> tuple[Ints, Ints]:

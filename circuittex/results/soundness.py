@@ -14,8 +14,8 @@ HOT = 300.0
 STRONGEST = 1e4
 """MPa: no fibre, of carbon or any other matter, carries more."""
 SOLID, ELASTOMER = 0.2, 100.0
-"""Drawn nylon carries a sixth of its modulus, perfect crystals a tenth, no solid a fifth. Matter with a modulus of up to
-`ELASTOMER` MPa is rubber, which is stretched until the stress is the modulus."""
+"""Drawn nylon carries a sixth of its modulus, perfect crystals a tenth, no solid a fifth. Matter with a modulus of up
+to `ELASTOMER` MPa is rubber, which is stretched until the stress is the modulus."""
 
 
 def deepest_overlap(contacts: ContactState) -> tuple[float, int, int]:

@@ -98,6 +98,25 @@ class Numerics:
         metadata=count("Newton iterations before a relaxation is given up or its step halved", 1, 100_000, shown="200"),
     )
     """Newton iterations before a relaxation is given up; an increment of a loading path is then made in halves."""
+    overlap_warning: float = field(
+        default=0.3,
+        metadata=number(
+            "1",
+            "overlap of two fibrils over R + R' from which on a state comes with a warning",
+            shown="0.3",
+            above=0,
+            at_most=1,
+        ),
+    )
+    """Overlap of two fibrils over R + R' from which on a state comes with a warning: the law of contact is for small
+    ones."""
+    overlap_limit: float = field(
+        default=0.5,
+        metadata=number(
+            "1", "the same from which on a state is not recorded but an error", shown="0.5", above=0, at_most=1
+        ),
+    )
+    """Overlap over R + R' from which on a state is not recorded: the law of contact means nothing there."""
     merge_length: float | str = field(
         default=AUTO,
         metadata=number(

@@ -36,6 +36,10 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
     ``contact_points``, ``levels``
         contact points at full resolution; levels in which the fibrils of the centre warp yarn lie at its centre
         crossing
+    ``deepest_overlap``, ``largest_stress_MPa``
+        the deepest overlap of two fibrils over R + R', and the largest force of a section over its reference area
+    ``doubts``
+        why the state cannot be right or trusted, in sentences: overlaps, stresses, temperatures; empty if all is well
     ``netlist``
         path of the detailed netlist, relative to the folder of the file
     ``error_estimate``
@@ -80,6 +84,7 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results.bifurcation import BranchCheck, branch_statement, current_difference, force_difference
 from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.records import Record, Study
+from circuittex.results.soundness import deepest_overlap, doubt_statement, doubts, section_stress
 from circuittex.results.verification import AGREEMENT
 from circuittex.results.work import EnergyBalance, step_balances
 
@@ -113,10 +118,12 @@ def write_summary(path: str | Path, study: Study) -> None:
 
 
 def table(study: Study) -> str:
-    """The closing table of a run: one line for each state, with its estimated error where there is one, then what the
-    study took, what the branch checks found, and whether ngspice confirmed it. A blank line parts the loading paths."""
+    """The closing table of a run: one line for each state, with its estimated error where there is one.
+
+    After it what the study took, what the branch checks found, which states to doubt, and whether ngspice confirmed it.
+    A blank line parts the loading paths."""
     head = ["state", "Fx warp N", "Fy weft N", *(f"{probe.name} A" for probe in study.design.probes)]
-    rows = [[*head, *_resistances(study), "iterations", "routes differ"]]
+    rows = [[*head, *_resistances(study), "overlap", "iterations", "routes differ"]]
     path = ""
     for record in study.records:
         if record.path != path:
@@ -125,12 +132,12 @@ def table(study: Study) -> str:
         network = record.fit.kind_resistance, record.fit.pair_resistance
         numbers = [record.clamp_force[0, 0], record.clamp_force[1, 1], *record.currents, *np.concatenate(network)]
         rows.append([record.name, *(f"{number:#.4g}" if number == number else "-" for number in numbers)])
-        rows[-1] += [str(record.iterations), f"{difference(record):.1e}"]
+        rows[-1] += [f"{deepest_overlap(record.contacts)[0]:.2f}", str(record.iterations), f"{difference(record):.1e}"]
         if (error := study.error_of(record.name)) is not None:
             cells = [_percent(quantity.relative) for quantity in error.quantities]
-            if len(cells) + 3 != len(rows[0]):  # estimated are the network's Ry and Rc as one number each
-                cells = [*cells[:-2], *["-"] * (len(rows[0]) - len(cells) - 1)]
-            rows.append(["  estimated error", *cells, "", ""])
+            if len(cells) + 4 != len(rows[0]):  # estimated are the network's Ry and Rc as one number each
+                cells = [*cells[:-2], *["-"] * (len(rows[0]) - len(cells) - 2)]
+            rows.append(["  estimated error", *cells, "", "", ""])
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
         "  ".join(
@@ -147,6 +154,7 @@ def table(study: Study) -> str:
             *branch_statement(study.branches),
             *warnings,
             *network_statement(study),
+            *doubt_statement(study),
             *ngspice_statement(study),
         ]
     )
@@ -295,6 +303,9 @@ def _state(study: Study, record: Record, step: EnergyBalance | None) -> dict[str
         "ports": {"names": record.ports.ports, "conductance_S": record.ports.conductance},
         "contact_points": record.contacts.n_contacts,
         "levels": record.levels,
+        "deepest_overlap": deepest_overlap(record.contacts)[0],
+        "largest_stress_MPa": section_stress(record).max(),
+        "doubts": [doubt.text for doubt in doubts(study, record)],
         "netlist": record.netlist,
         "error_estimate": None if error is None else _error_estimate(error),
         "branch_check": None if check is None else _branch_check(check),

@@ -24,6 +24,7 @@ from circuittex.results.outcome import Outcome
 from circuittex.results.records import Record, Study
 from circuittex.study.export import detailed_file, simplified
 from circuittex.study.plan import Step
+from circuittex.study.soundness import check_sound
 from circuittex.study.verify import field_convergence, probe_circuits, verify
 from circuittex.study.verify_reduced import verify_reduced
 
@@ -67,14 +68,18 @@ def reach(
             say=lambda text: say(f"{step.name}: {text}\n"),
         )
     except ConvergenceError as error:
-        raise ConvergenceError(f"{step.name}: {error}", error.history) from error
+        raise type(error)(f"{step.name}: {error}", error.history) from error
 
 
 def record_state(study: Study, step: Step, reached: Increment, say: Callable[[str], None]) -> Record:
-    """Contacts, fields, circuit, verification and fit of one equilibrium."""
+    """Contacts, fields, circuit, verification and fit of one equilibrium.
+
+    Raises `PenetrationError`, naming the state, where fibrils passed through one another or overlap too deeply.
+    """
     say(f"{step.name}: fields, netlists and verification")
     design, mesh, equilibrium = study.design, study.mesh, reached.equilibrium
     contacts = contacts_of(design, mesh, equilibrium.configuration)
+    check_sound(study, step, equilibrium.configuration.r, contacts)
     fields = solve_probes(contacts, design.terminals, design.probes, contact_heat=design.electrical.contact_heat)
     merged = simplified(design, contacts).contacts
     circuits = probe_circuits(contacts, design.terminals, design.probes)

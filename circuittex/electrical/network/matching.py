@@ -197,8 +197,8 @@ Model = Callable[[Circuit, Floats, Floats], tuple[Floats, Floats]]
 def _matched(design: Design, grouping: Groups, target: Floats, model: Model, data: str) -> Match:
     count = len(grouping.start)
     if not len(target) or not count:
-        reasons: tuple[str, ...] = (f"no value is determined: {data} say nothing",) if count else ()
-        return Match(np.full(count, np.nan), np.ones(count, dtype=bool), np.nan, reasons)
+        reason = f"no value is determined: {data} say nothing" if count else "no yarn conducts: there is no network"
+        return Match(np.full(count, np.nan), np.ones(count, dtype=bool), np.nan, (reason,))
     shape = len(design.weave.warp), len(design.weave.weft)
     of_resistor = np.concatenate(
         [

@@ -58,22 +58,3 @@ elements = 8
 
 NEVER = SMALL.replace("elements = 8", "elements = 8\nmax_iterations = 1")
 """The same with an iteration too few for any equilibrium."""
-
-TWO_PATHS = (
-    SMALL
-    + """
-[[loading]]
-name = "stretch"
-kind = "uniaxial"
-axis = "x"
-strain = 0.01
-steps = 1
-
-[[loading]]
-name = "shear"
-kind = "shear"
-strain = 0.01
-steps = 1
-"""
-)
-"""The same with two loading paths, which two processes can follow."""

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from small_design import NEVER, SMALL, TWO_PATHS
+from small_design import NEVER, SMALL
 
 import circuittex
 from circuittex.command.exit_codes import MEANINGS, ExitCode, table
@@ -127,32 +127,52 @@ def test_a_network_share_completes_with_a_note(folder: Path, what: str, code: in
     assert all(line.startswith("circuittex: note: o: its file system") for line in lines)
 
 
+LOADING = """
+from circuittex.command.figures import plain_figures
+from circuittex.command.streams import show_notes
+
+show_notes()
+plain_figures()
+import matplotlib.font_manager
+from circuittex.base.workers import Pool
+from circuittex.study.record import reach
+
+pool = Pool(2, 1, print)
+for name in ("first", "second"):
+    pool.submit(name, reach)
+for _ in range(2):
+    try:
+        pool.next()
+    except TypeError:  # it got nothing to work on, but has loaded everything
+        pass
+pool.close()
+"""
+"""What a run with two worker processes loads, without the work."""
+
+
 @pytest.mark.skipif(shutil.which("setpriv") is None, reason="needs util-linux to take root's rights away")
 @pytest.mark.parametrize("foreign", [False, True])
 def test_a_read_only_installation_without_a_home(folder: Path, foreign: bool) -> None:
     """Compiled functions are kept among the temporary files, unless somebody else could have put them there.
 
-    One note, though two worker processes compile and matplotlib finds no home either. Where nothing can be kept, an
-    import shows it: compiling everything anew would be long here.
+    One note, though worker processes compile as well and matplotlib finds no home either (which says so itself, where
+    there is no private folder for it). What a run loads is loaded; to compile all of it anew would be long here.
     """
     package = Path(circuittex.__file__).parent
     for name in ("site", "home", "tmp"):
         (folder / name).mkdir()
     private = folder / "tmp" / f"circuittex-{os.getuid()}"
-    command = "-m circuittex run two.toml --out o --workers 2 --quiet"
-    (folder / "two.toml").write_text(TWO_PATHS, encoding="utf-8")
     if foreign:
         private.mkdir()
         private.chmod(0o777)
-        command = "from circuittex.command.streams import show_notes; show_notes(); import circuittex.solvers.pattern"
-        command = f"-c '{command}'"
+    (folder / "load.py").write_text(LOADING, encoding="utf-8")
     shutil.copytree(package, folder / "site" / "circuittex", ignore=shutil.ignore_patterns("__pycache__"))
     subprocess.run(["chmod", "-R", "a-w", "site", "home"], cwd=folder, check=True)
     rights = "-dac_override,-dac_read_search,-fowner"
     take = f"--bounding-set={rights} --inh-caps={rights}" if os.getuid() == 0 else ""
     done = shell(
         folder,
-        f'setpriv {take} "$PYTHON" {command}',
+        f'setpriv {take} "$PYTHON" load.py',
         PYTHONPATH=str(folder / "site"),
         HOME=str(folder / "home"),
         XDG_CONFIG_HOME=None,
@@ -162,8 +182,9 @@ def test_a_read_only_installation_without_a_home(folder: Path, foreign: bool) ->
         TMPDIR=str(folder / "tmp"),
     )
     subprocess.run(["chmod", "-R", "u+w", "site", "home"], cwd=folder, check=True)
-    assert done.returncode == ExitCode.DONE, done.stderr.decode()
-    (note,) = done.stderr.decode().splitlines()
+    assert done.returncode == 0, done.stderr.decode()
+    lines = done.stderr.decode().splitlines()
+    (note,) = lines if not foreign else [line for line in lines if "compiled functions" in line]
     assert note.startswith("circuittex: note: neither the installation nor the home folder can be written to: ")
     assert note.endswith("compiled anew in every process" if foreign else f"kept in {private}")
 

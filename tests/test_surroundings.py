@@ -40,8 +40,10 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_the_backend_of_a_notebook_that_is_not_installed_here(folder: Path) -> None:
-    done = shell(folder, "circuittex run small.toml --out o --quiet", MPLBACKEND="module://no_such_backend.inline")
+# Of a module that it does not know matplotlib believes that it is there; of a notebook's it looks.
+@pytest.mark.parametrize("backend", ["module://matplotlib_inline.backend_inline", "no_such_backend"])
+def test_the_backend_of_a_notebook_that_is_not_installed_here(folder: Path, backend: str) -> None:
+    done = shell(folder, "circuittex run small.toml --out o --quiet", MPLBACKEND=backend)
     assert (done.returncode, done.stderr) == (ExitCode.DONE, b"")
 
 

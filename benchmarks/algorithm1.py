@@ -30,11 +30,11 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.dynamics import STEP_TOLERANCE, Inertia, damping_matrix
+from circuittex.mech.linear import LinearSolver, Solve
+from circuittex.mech.multifrontal import MultifrontalSolver
+from circuittex.mech.pattern import Pattern, build_pattern, diagonal
 from circuittex.mech.terms import ForceTerm
 from circuittex.relaxation.relax import force_terms, relax
-from circuittex.solvers.linear import LinearSolver, Solve
-from circuittex.solvers.multifrontal import MultifrontalSolver
-from circuittex.solvers.pattern import Pattern, build_pattern, diagonal
 
 GAMMA = 1e-4
 """The paper's damping, 0.1 N s/m for every mm3, in N s/mm4."""
@@ -81,7 +81,7 @@ class March:
             pattern, values, gradient = tables.assemble(q)
             if not np.all(np.isfinite(gradient)):
                 break
-            if np.abs(gradient[free]).max() <= STEP_TOLERANCE * self.design.numerics.tolerance:
+            if np.abs(gradient[free]).max() <= STEP_TOLERANCE * self.design.numerics.force_tolerance:
                 return q
             solve = solver.factor(pattern, values)
             self.solves += 1
@@ -142,7 +142,7 @@ def marched(mesh: FibrilMesh, design: Design, dt: float, steps: int) -> list[tup
     def go() -> None:
         for residual in march.residuals():
             history.append(residual)
-            if residual <= design.numerics.tolerance or len(history) == steps:
+            if residual <= design.numerics.force_tolerance or len(history) == steps:
                 return
 
     seconds = seconds_of(go)
@@ -150,10 +150,10 @@ def marched(mesh: FibrilMesh, design: Design, dt: float, steps: int) -> list[tup
     state = [last, march.energy]
     if march.failed:
         return [([f"fails: {march.failed}", dt, done, march.solves, *state], np.nan, "")]
-    if last <= design.numerics.tolerance:
+    if last <= design.numerics.force_tolerance:
         return [(["Algorithm 1", dt, done, march.solves, *state], seconds, "")]
     rows = [(["Algorithm 1, cut short", dt, f"> {done}", f"> {march.solves}", *state], seconds, "> ")]
-    total = steps_needed(np.array(history), design.numerics.tolerance)
+    total = steps_needed(np.array(history), design.numerics.force_tolerance)
     if total is not None:
         cells = ["the same, extrapolated", dt, f"~ {total}", f"~ {march.solves * total // done}", "", ""]
         rows.append((cells, seconds * total / done, "~ "))
@@ -189,14 +189,16 @@ def compare(design: Design, dts: list[float], steps: int) -> Table:
         times = [f"{sign}{digits(each)}" for each in (seconds, seconds / own)] if np.isfinite(seconds) else ["", ""]
         rows.append([*cells, *times])
     title = f"{mesh.n_fibrils} fibrils of {design.numerics.elements} elements, to a residual of "
-    title += f"{design.numerics.tolerance:.0e} N; the relaxation's linear solves do not count refused factorisations:"
+    title += (
+        f"{design.numerics.force_tolerance:.0e} N; the relaxation's linear solves do not count refused factorisations:"
+    )
     return Table(title, HEAD, rows)
 
 
 def small_cell() -> tuple[FibrilMesh, Design]:
     """One crossing of two fibrils."""
     design = plain_weave(yarns=1, rows=(1,))
-    design = replace(design, numerics=replace(design.numerics, elements=4, tolerance=1e-5))
+    design = replace(design, numerics=replace(design.numerics, elements=4, tolerance="1e-5 N"))
     return build_mesh(design), design
 
 
@@ -210,7 +212,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=2000, help="steps after which a march is cut short")
     options = parser.parse_args()
     base = plain_weave(options.parameters, yarns=options.yarns, rows=tuple(options.rows))
-    design = replace(base, numerics=replace(base.numerics, elements=options.elements))
+    design = replace(base, numerics=replace(base.numerics, elements=options.elements, tolerance="1e-6 N"))
     publish(options, [compare(design, options.dt, options.steps)])
 
 

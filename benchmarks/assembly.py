@@ -20,8 +20,8 @@ from circuittex.geometry.weave import build_mesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.form import BeamForm
+from circuittex.mech.pattern import build_pattern
 from circuittex.mech.space import beam_space
-from circuittex.solvers.pattern import build_pattern
 
 HEAD = ["order", "elements", "section points", "scikit-fem ms", "compiled ms", "ratio", "relative difference"]
 

@@ -30,9 +30,9 @@ from circuittex.design import Design, plain_weave
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import initial_configuration
+from circuittex.mech.pattern import Pattern, build_pattern
 from circuittex.mech.section import disk_rule
 from circuittex.mech.space import BeamSpace, beam_space
-from circuittex.solvers.pattern import Pattern, build_pattern
 
 WORKER = Path(__file__).with_name("dolfinx_worker.py")
 OURS = "circuittex"

@@ -20,12 +20,12 @@ from circuittex.base.arrays import Ints
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.order import reordered
 from circuittex.mech.configuration import Configuration
+from circuittex.mech.linear import LinearSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
+from circuittex.mech.pardiso import PardisoSolver
 from circuittex.results.bifurcation import current_difference, force_difference
 from circuittex.results.records import Study
 from circuittex.results.store import load_study
-from circuittex.solvers.linear import LinearSolver
-from circuittex.solvers.multifrontal import MultifrontalSolver
-from circuittex.solvers.pardiso import PardisoSolver
 from circuittex.study.branch_check import SEED, another_order
 from circuittex.study.plan import plan
 from circuittex.study.record import outcome_of, reach

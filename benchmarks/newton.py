@@ -29,14 +29,14 @@ from circuittex.design import Design, plain_weave
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.linear import LinearSolver, Solve
+from circuittex.mech.multifrontal import MultifrontalSolver
+from circuittex.mech.pardiso import PardisoSolver
+from circuittex.mech.pattern import Pattern
 from circuittex.mech.space import BeamSpace
 from circuittex.mech.terms import ForceTerm
 from circuittex.relaxation.relax import force_terms
 from circuittex.relaxation.transfer import transfer
-from circuittex.solvers.linear import LinearSolver, Solve
-from circuittex.solvers.multifrontal import MultifrontalSolver
-from circuittex.solvers.pardiso import PardisoSolver
-from circuittex.solvers.pattern import Pattern
 
 PART_HEAD = ["part", "calls an iteration", "ms a call", "% of the time"]
 SOLVER_HEAD = [

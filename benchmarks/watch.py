@@ -4,25 +4,30 @@ from __future__ import annotations
 
 import contextlib
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.errors import ConvergenceError
 from circuittex.contact.penalty import PenaltyContact
+from circuittex.design import plain_weave
 from circuittex.mech.beam import Beam
+from circuittex.mech.linear import LinearSolver, Solve
 from circuittex.mech.minimise import minimise
+from circuittex.mech.pattern import Pattern
+from circuittex.mech.scales import fibril_scales
 from circuittex.mech.space import BeamSpace
 from circuittex.mech.terms import ForceTerm
-from circuittex.solvers.linear import LinearSolver, Solve
-from circuittex.solvers.pattern import Pattern
 
 SEARCH, CLOSEST, ENERGY = "candidate search", "closest points, contact energy", "beam energy"
-BEAM, CONTACT, PATTERN, MASS = "beam assembly", "contact assembly", "pattern", "mass matrix"
+BEAM, CONTACT, PATTERN, METRIC = "beam assembly", "contact assembly", "pattern", "metric"
 ANALYSIS, FACTOR, REFUSED = "analysis and first factorisation", "factorisation", "factorisation, not positive"
 SOLVE, REST = "solution", "the rest (vectors)"
-PARTS = (SEARCH, CLOSEST, ENERGY, BEAM, CONTACT, PATTERN, MASS, ANALYSIS, FACTOR, REFUSED, SOLVE, REST)
+PARTS = (SEARCH, CLOSEST, ENERGY, BEAM, CONTACT, PATTERN, METRIC, ANALYSIS, FACTOR, REFUSED, SOLVE, REST)
+
+PITCH = plain_weave().weave.pitch
+"""That of every weave that is measured, mm."""
 
 
 @dataclass
@@ -131,26 +136,29 @@ def descend(
     iterations: int,
     tolerance: float = 0.0,
 ) -> tuple[Floats, Stopwatch, tuple[Pattern, Floats]]:
-    """The unknowns after that many iterations from q or at that tolerance, what they took, and the last matrix."""
+    """The unknowns after that many iterations from q or at that tolerance (N), what they took, and the last matrix."""
     space, beam, contact = terms
     watch = Stopwatch()
     watched, watched_solver = WatchedTerm(contact, watch, (SEARCH, CLOSEST, CONTACT)), WatchedSolver(solver, watch)
 
-    def mass(pattern: Pattern) -> Floats:
+    scales = fibril_scales(space, PITCH)
+
+    def metric(pattern: Pattern) -> Floats:
         watch.add(PATTERN, watch.asked)
         watch.asked, clock = np.inf, time.perf_counter()
-        values = beam.mass(pattern)
-        watch.add(MASS, clock)
+        values = scales.metric(pattern)
+        watch.add(METRIC, clock)
         return values
 
     with contextlib.suppress(ConvergenceError):  # it is not meant to converge in so few
         minimise(
             [WatchedTerm(beam, watch, (SEARCH, ENERGY, BEAM)), watched],
             q,
-            mass=mass,
+            scales=replace(scales, metric=metric),
             fixed=space.fixed,
             solver=watched_solver,
-            tolerance=tolerance,
+            tolerance=0.0,
+            force_tolerance=tolerance,
             max_iterations=iterations,
             report=watch.report,
         )

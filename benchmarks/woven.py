@@ -23,7 +23,7 @@ def woven_circuit(yarns: int, merge_length: float) -> Circuit:
         simplify(
             contacts,
             merge_length=merge_length,
-            snap_length=numerics.snap_length,
+            snap_length=design.snap_length,
             drop_fraction=numerics.drop_fraction,
         )
     )

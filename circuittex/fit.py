@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from circuittex.base.arrays import Floats
+from circuittex.base.binary import power_of_two
 from circuittex.base.errors import CircuitError
 from circuittex.base.frozen import frozen
 from circuittex.design import Design
@@ -87,7 +88,8 @@ def yarn_conductance(design: Design) -> float:
     return max(
         sum(material.electrical_conductivity for material in yarn.materials)
         * np.pi
-        * yarn.radius**2
+        * yarn.radius
+        * yarn.radius
         / (count * weave.pitch)
         for yarn, count in zip(weave.warp + weave.weft, crossings, strict=True)
     )
@@ -181,16 +183,17 @@ def _with_contacts(design: Design, wanted: Floats, scale: Floats, volts: Floats,
     """Fit log Ry and log Rc, from the best of a table of ratios (given Rc / Ry, the best 1 / Ry is linear)."""
     target = wanted / scale
     start, best = np.zeros(2), np.inf
+    unit = power_of_two(float(wanted.max()))  # S: logarithms of pure numbers are rounded alike at every scale
     for ratio in _RATIOS:
         model = network_conductances(design, 1.0, ratio).sum(axis=1) / scale
         siemens = float(model @ target / (model @ model))
         size = float(np.linalg.norm(siemens * model - target))
         if siemens > 0.0 and size < best:
-            start, best = np.log([1.0 / siemens, ratio]), size
+            start, best = np.log([unit / siemens, ratio]), size
 
     # The search is in log Ry and log Rc / Ry: bounds of the ratio keep the network solvable.
     def values(logs: Floats) -> tuple[float, float]:
-        return float(np.exp(logs[0])), float(np.exp(logs[0] + logs[1]))
+        return float(np.exp(logs[0])) / unit, float(np.exp(logs[0] + logs[1])) / unit
 
     def misfits(logs: Floats) -> Floats:
         difference: Floats = network_conductances(design, *values(logs)).sum(axis=1) / scale - target

@@ -18,10 +18,11 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.mech.minimise import Minimum, minimise
+from circuittex.mech.multifrontal import MultifrontalSolver
+from circuittex.mech.pattern import DOFS, Pattern, build_pattern
+from circuittex.mech.scales import fibril_scales
 from circuittex.mech.space import BeamSpace, beam_space
 from circuittex.mech.terms import ForceTerm
-from circuittex.solvers.multifrontal import MultifrontalSolver
-from circuittex.solvers.pattern import DOFS, Pattern, build_pattern
 
 MODULUS = 10.0
 """E in MPa, that of the paper's fibrils."""
@@ -101,10 +102,11 @@ def rest(
     found = minimise(
         [beam, *terms],
         beam.space.vector(start),
-        mass=beam.mass,
+        scales=fibril_scales(beam.space, span=float(beam.space.mesh.length.max())),
         fixed=fixed,
         solver=MultifrontalSolver(),
-        tolerance=tolerance,
+        tolerance=0.0,
+        force_tolerance=tolerance,
         max_iterations=max_iterations,
     )
     return beam.space.configuration(found.q), found

@@ -163,7 +163,7 @@ def contact_term(
 
 
 def small_cell(
-    rows: tuple[int, ...] = (1, 2), *, elements: int = 6, order: int = 2, **numerics: float | int
+    rows: tuple[int, ...] = (1, 2), *, elements: int = 6, order: int = 2, **numerics: float | int | str
 ) -> tuple[Design, FibrilMesh]:
     """A cell of two by two yarns with few elements, and its mesh."""
     design = plain_weave(yarns=2, rows=rows)

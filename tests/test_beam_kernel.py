@@ -18,8 +18,8 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.mech.form import BeamForm
+from circuittex.mech.pattern import multiply
 from circuittex.mech.space import BeamSpace, beam_space
-from circuittex.solvers.pattern import multiply
 
 ROUND_OFF = 1e-13
 """Relative difference of two orders of summation over a few hundred terms."""

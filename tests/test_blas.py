@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import sys
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -53,17 +53,27 @@ def test_a_routine_with_other_arguments_is_not_called() -> None:
 
 
 def test_other_threads_run_meanwhile() -> None:
-    """While a call works for some tenths of a second this thread goes on; with the lock held it would rest as long."""
-    K, took = stiff(3000), []
+    """A call gives Python's lock away: where the interpreter never takes it from a thread, this one runs only then.
 
-    def work() -> None:
-        clock = time.perf_counter()
+    Counted, not timed: the worker sees how far this thread has counted before and after its call.
+    """
+    K, counted, seen = stiff(2000), [0], []
+    begun, interval = threading.Event(), sys.getswitchinterval()
+
+    def factorise() -> None:
+        seen.append(counted[0])
+        begun.set()
         cholesky(K)
-        took.append(time.perf_counter() - clock)
+        seen.append(counted[0])
 
-    thread, longest, last = threading.Thread(target=work), 0.0, time.perf_counter()
-    thread.start()
-    while thread.is_alive():
-        now = time.perf_counter()
-        longest, last = max(longest, now - last), now
-    assert longest < 0.5 * took[0]
+    thread = threading.Thread(target=factorise)
+    sys.setswitchinterval(1e6)
+    try:
+        thread.start()
+        begun.wait()
+        for _ in range(1000):
+            counted[0] += 1
+        thread.join()
+    finally:
+        sys.setswitchinterval(interval)
+    assert seen == [0, 1000]

@@ -20,14 +20,14 @@ from circuittex.command.cli import main
 from circuittex.design import Design, Loading, starter, uniaxial
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
+from circuittex.mech.linear import LinearSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation.increment import Increment
 from circuittex.relaxation.relax import Equilibrium
 from circuittex.results.bifurcation import ALLOWED, BranchCheck, Verdict
 from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.records import Record, Study
 from circuittex.results.store import load_study
-from circuittex.solvers.linear import LinearSolver
-from circuittex.solvers.multifrontal import MultifrontalSolver
 from circuittex.study.branch_check import another_order, check_branch
 from circuittex.study.plan import Step, plan
 from circuittex.study.record import reach
@@ -48,7 +48,7 @@ def test_the_other_order_is_another_one(n: int) -> None:
 
 def test_a_cell_that_keeps_its_branch(tmp_path: Path) -> None:
     """In two processes, each with the mesh and the states that it is sent, and kept in a file."""
-    design, _ = small_cell((1, 2), elements=4, tolerance=1e-8)
+    design, _ = small_cell((1, 2), elements=4, tolerance="1e-8 N")
     design = replace(design, loading=(uniaxial("stretch", (0.05,)),))
     study = run_study(design, tmp_path, branches=True, workers=2)
     assert [check.state for check in study.branches] == ["relaxed", "stretch-0.05"]
@@ -64,7 +64,7 @@ def test_a_cell_that_keeps_its_branch(tmp_path: Path) -> None:
 
 def test_a_warp_that_may_buckle_to_either_side_is_a_bifurcation() -> None:
     """A warp fibril of 0.15 mm radius lies more than a millimetre away in the other branch, at another energy."""
-    design, _ = small_cell((1,), elements=8, order=1, section_degree=6, tolerance=1e-8)
+    design, _ = small_cell((1,), elements=8, order=1, section_degree=6, tolerance="1e-8 N")
     study = run_study(replace(design, loading=(PRESS,)), branches=True, workers=1)
     assert [check.verdict for check in study.branches] == [Verdict.SAME, Verdict.SAME, Verdict.BIFURCATION]
     found, record = study.branches[-1], study.records[-1]
@@ -86,13 +86,13 @@ def test_a_warp_that_may_buckle_to_either_side_is_a_bifurcation() -> None:
 @pytest.fixture(scope="module")
 def loose() -> Study:
     """A cell relaxed to a tolerance of a hundredth of its clamp forces."""
-    design, _ = small_cell((1, 2), elements=4, tolerance=1e-3)
+    design, _ = small_cell((1, 2), elements=4, tolerance="1e-3 N")
     return run_study(replace(design, loading=()), workers=1)
 
 
 def sharper(study: Study, step: Step, start: Configuration, solver: Callable[[], LinearSolver], say: Say) -> Increment:
     """Stands for a descent that stops elsewhere within the tolerance."""
-    numerics = replace(study.design.numerics, tolerance=1e-6)
+    numerics = replace(study.design.numerics, tolerance="1e-6 N")
     return reach(replace(study, design=replace(study.design, numerics=numerics)), step, start, solver, say)
 
 
@@ -115,7 +115,7 @@ def test_what_the_tolerance_leaves_is_no_branch(loose: Study, monkeypatch: pytes
 def test_what_cannot_be_relaxed_further_is_not_decided(loose: Study, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(mesh: FibrilMesh, design: Design, *_: object, **__: object) -> Equilibrium:
         largest = np.abs(loose.records[0].clamp_force).max()
-        assert design.numerics.tolerance == pytest.approx(1e-7 * largest, rel=1e-12)
+        assert design.numerics.force_tolerance == pytest.approx(1e-7 * largest, rel=1e-12)
         raise ConvergenceError("round-off")
 
     monkeypatch.setattr(module, "reach", sharper)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from circuittex.base.arrays import Floats
 from circuittex.contact.penalty import PenaltyContact
 from circuittex.geometry.mesh import FibrilMesh
-from circuittex.solvers.pattern import Pattern, build_pattern, multiply
+from circuittex.mech.pattern import Pattern, build_pattern, multiply
 
 P, R = 5.0, 0.15
 

@@ -306,9 +306,9 @@ def test_hash_sees_every_value() -> None:
         {"weave": dataclasses.replace(design.weave, draft=tuple(reversed(design.weave.draft)))},
     ]
     numerics = {f.name: getattr(design.numerics, f.name) for f in dataclasses.fields(Numerics)}
-    other = {"order": 1, "tolerance": 1e-7, "snap_length": 1e-4, "drop_fraction": 1e-7}
+    other = {"order": 1, "tolerance": 1e-7, "merge_length": 2.0, "snap_length": 1e-4, "drop_fraction": 1e-7}
     for name, value in numerics.items():
-        changes.append({"numerics": Numerics(**{**numerics, name: other.get(name, value + 1)})})
+        changes.append({"numerics": Numerics(**{**numerics, name: other[name] if name in other else value + 1})})
     hashes = {design_hash(design)} | {design_hash(dataclasses.replace(design, **change)) for change in changes}
     assert len(hashes) == len(changes) + 1
 

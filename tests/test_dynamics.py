@@ -15,13 +15,15 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.dynamics import Rest, affine_velocity, damping_matrix, march, relax_dynamically
+from circuittex.mech.multifrontal import MultifrontalSolver
+from circuittex.mech.scales import fibril_scales
 from circuittex.mech.space import BeamSpace, beam_space
 from circuittex.relaxation.relax import clamp_force, force_terms, move, relax
-from circuittex.solvers.multifrontal import MultifrontalSolver
 
 E, RHO, R = 10.0, 1.0, 0.15  # MPa, g/mm3, mm
 RHO_N = 1e-6 * RHO  # N s2/mm4, since 1 N = 1e6 g mm/s2
 GAMMA = 1e-4  # N s/mm4: the paper's 0.1 N s/m for every mm3
+SPAN = 2.0  # mm, the pitch of the cell
 TIGHT = 1e-8  # N, where results are compared to 1e-6 of a clamp force of 0.1 N
 
 
@@ -45,6 +47,7 @@ def test_free_flight_coasts_and_drag_slows_it_by_a_known_factor(gamma: float) ->
                 [beam],
                 q,
                 velocity.ravel(),
+                scales=fibril_scales(space, SPAN),
                 mass=beam.mass,
                 damping=damping_matrix(space, gamma),
                 fixed=np.empty(0, dtype=np.int64),
@@ -86,6 +89,7 @@ def test_an_axial_wave_has_its_frequency_and_its_numerical_damping(gamma: float)
         [beam],
         start.ravel(),
         np.zeros_like(q),
+        scales=fibril_scales(space, SPAN),
         mass=beam.mass,
         damping=damping_matrix(space, gamma),
         fixed=space.fixed,
@@ -117,6 +121,7 @@ def test_kinetic_energy_of_a_spinning_fibril_has_the_rotary_term() -> None:
         [beam],
         q,
         spin.ravel(),
+        scales=fibril_scales(space, SPAN),
         mass=beam.mass,
         damping=damping_matrix(space, 0.0),
         fixed=space.fixed,
@@ -130,7 +135,7 @@ def test_kinetic_energy_of_a_spinning_fibril_has_the_rotary_term() -> None:
 
 @pytest.fixture(scope="module")
 def cell() -> tuple[Design, FibrilMesh]:
-    return small_cell((1, 2), elements=6, tolerance=TIGHT)
+    return small_cell((1, 2), elements=6, tolerance=f"{TIGHT} N")
 
 
 def settle(cell: tuple[Design, FibrilMesh], **options: object) -> tuple[BeamSpace, Rest]:
@@ -139,6 +144,7 @@ def settle(cell: tuple[Design, FibrilMesh], **options: object) -> tuple[BeamSpac
     settings = {"q": space.vector(initial_configuration(mesh)), "dt": 1e-2, "t_relax": 1.0, **options}
     rest = relax_dynamically(
         [beam, contact],
+        scales=fibril_scales(space, SPAN),
         mass=beam.mass,
         damping=damping_matrix(space, GAMMA),
         fixed=space.fixed,

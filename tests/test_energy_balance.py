@@ -20,6 +20,7 @@ from circuittex.design import Design, load_unload, plain_weave, shear, uniaxial
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation.increment import advance
 from circuittex.relaxation.relax import Equilibrium, move, relax
 from circuittex.results.records import Record, Study
@@ -28,7 +29,6 @@ from circuittex.results.report.number import number
 from circuittex.results.store import load_study, write_study_start
 from circuittex.results.summary import summary
 from circuittex.results.work import EnergyBalance, balance, clamp_balance, step_balances
-from circuittex.solvers.multifrontal import MultifrontalSolver
 from circuittex.study.run import run_study
 
 TOLERANCE = 1e-7  # N, largest free force
@@ -114,7 +114,7 @@ FIRST, LAST = 0.05, 0.15
 def crossing() -> tuple[Fabric, Equilibrium]:
     """One yarn over another, stretched to the beginning of the path: from here on the same fibrils touch."""
     design = plain_weave(yarns=1, rows=(1, 2))
-    design = replace(design, numerics=replace(design.numerics, elements=4, order=2, tolerance=TOLERANCE))
+    design = replace(design, numerics=replace(design.numerics, elements=4, order=2, tolerance=f"{TOLERANCE} N"))
     fabric = Fabric(design, build_mesh(design))
     rest = relax(fabric.mesh, design)
     return fabric, fabric.along([0.0, FIRST], rest)[-1]
@@ -186,7 +186,7 @@ class Loop:
 
 @pytest.fixture(scope="module")
 def loop() -> Loop:
-    design, mesh = small_cell((2, 3), elements=4, tolerance=TOLERANCE)
+    design, mesh = small_cell((2, 3), elements=4, tolerance=f"{TOLERANCE} N")
     fabric = Fabric(design, mesh)
     start = fabric.along([0.0, STRAINS[0]], relax(mesh, design))[-1]
     coarse = fabric.along(STRAINS, start)
@@ -333,7 +333,7 @@ def test_forces_on_the_ends_are_those_on_the_nodes() -> None:
 
 def test_a_study_keeps_the_balance_of_its_equilibria(tmp_path: Path) -> None:
     """The same equilibria computed without a study; on the strip the weft is let go and does no work any more."""
-    design, mesh = small_cell((1, 2), elements=4, tolerance=TOLERANCE)
+    design, mesh = small_cell((1, 2), elements=4, tolerance=f"{TOLERANCE} N")
     loading = (load_unload(uniaxial("cycle", (0.03, 0.06))), shear("strip", (0.05, 0.1), free="y"))
     design = replace(design, terminals=(), probes=(), loading=loading)
     study = run_study(design, workers=1, solver=MultifrontalSolver)

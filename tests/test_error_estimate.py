@@ -24,12 +24,12 @@ from circuittex.electrical.fields import solve_probes
 from circuittex.fit import fit_network
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation.relax import Equilibrium, clamp_force, relax
 from circuittex.relaxation.transfer import transfer
 from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.records import Record, Study, with_finding
 from circuittex.results.store import load_study
-from circuittex.solvers.multifrontal import MultifrontalSolver
 from circuittex.study.error_estimate import estimate_error, estimates, variants
 from circuittex.study.run import run_study
 

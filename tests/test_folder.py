@@ -101,7 +101,7 @@ def lacking(folder: Path) -> tuple[str, ...]:
     """As an older version left it, whose records had fewer fields."""
     write_study_start(folder / "results.h5", STUDY)
     with h5py.File(folder / "results.h5", "r+") as file:
-        for record in file["records"].values():
+        for record in file["states"].values():
             del record.attrs["energy"], record["end_force"]
     return str(folder / "results.h5"), "the fields of Record are not those of this version of circuittex"
 

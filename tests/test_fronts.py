@@ -17,10 +17,11 @@ import circuittex.solvers.fronts as fronts
 from circuittex.base.arrays import Ints
 from circuittex.design import plain_weave
 from circuittex.geometry.weave import build_mesh
-from circuittex.solvers.coupled import entries_of, pair_of_entry
+from circuittex.mech.coupled import entries_of, pair_of_entry
+from circuittex.mech.multifrontal import blocks
+from circuittex.mech.pattern import Pattern, build_pattern
 from circuittex.solvers.dissection import minimum_degree
-from circuittex.solvers.fronts import Analysis, Front
-from circuittex.solvers.pattern import Pattern, build_pattern
+from circuittex.solvers.fronts import Analysis, Entries, Front
 
 NOTHING = np.empty((0, 2), dtype=np.int64)
 
@@ -37,7 +38,12 @@ def patterns(draw: st.DrawFn) -> Pattern:
 
 def analyse(pattern: Pattern) -> Analysis:
     """The fronts with all pairs of the pattern coupled."""
-    return fronts.analyse(pattern, np.ones(len(pattern.neighbour), dtype=bool), np.arange(pattern.nnz))
+    return some_pairs(pattern, np.ones(len(pattern.neighbour), dtype=bool), np.arange(pattern.nnz))
+
+
+def some_pairs(pattern: Pattern, coupled: NDArray[np.bool_], entries: Ints) -> Analysis:
+    """The fronts with some pairs coupled, of which these entries are."""
+    return fronts.analyse(blocks(pattern, coupled), Entries(pattern.indptr, pattern.indices, entries))
 
 
 def merge_nothing(patch: pytest.MonkeyPatch) -> None:
@@ -137,7 +143,7 @@ def test_pairs_that_are_not_coupled_are_left_out(pattern: Pattern, seed: int) ->
     full = pattern.full_offset >= 0
     smaller = build_pattern(pattern.n_dofs // 9, pairs[coupled & full], pairs[coupled & ~full])
     entries = entries_of(pair_of_entry(pattern), coupled)
-    found, expected = fronts.analyse(pattern, coupled, entries), analyse(smaller)
+    found, expected = some_pairs(pattern, coupled, entries), analyse(smaller)
     assert np.array_equal(found.order, expected.order)
     assert np.array_equal(found.target, expected.target)
     assert np.array_equal(pattern.indices[entries], smaller.indices)

@@ -17,10 +17,10 @@ from circuittex.design import Design, Gradient, Loading, biaxial, load_unload, p
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation import increment
 from circuittex.relaxation.increment import Increment, advance
 from circuittex.relaxation.relax import Equilibrium, clamp_force, relax
-from circuittex.solvers.multifrontal import MultifrontalSolver
 
 TIGHT = 1e-8  # N
 AREA = np.pi * 0.15**2  # mm2
@@ -31,7 +31,7 @@ REST = np.eye(2)
 @pytest.fixture(scope="module")
 def cell() -> tuple[Design, FibrilMesh, Equilibrium]:
     """Two by two yarns of one fibril, woven and relaxed; half a turn about x takes it to itself."""
-    design, mesh = small_cell((1,), tolerance=TIGHT)
+    design, mesh = small_cell((1,), tolerance=f"{TIGHT} N")
     return design, mesh, relax(mesh, design, solver=MultifrontalSolver())
 
 
@@ -54,7 +54,7 @@ def clamps(cell: Cell, state: Increment) -> Floats:
 
 def straight_cell(**numerics: Any) -> tuple[Design, FibrilMesh]:
     """Two by two single fibrils of 4 mm, straight, in one plane and without contact: closed forms hold."""
-    design, mesh = small_cell((1,), tolerance=TIGHT, **numerics)
+    design, mesh = small_cell((1,), tolerance=f"{TIGHT} N", **numerics)
     along = np.eye(3)[mesh.yarn_axis[mesh.yarn[mesh.node_fibril]]]
     up = np.tile([0.0, 0.0, 1.0], (mesh.n_nodes, 1))
     directors = np.stack([np.cross(up, along), up], axis=1)
@@ -168,7 +168,7 @@ def test_two_crossings_cannot_hold_a_free_yarn(cell: Cell) -> None:
         assert clamps(cell, state)[0, 0] == pytest.approx(force, abs=1e-5)
         assert clamps(cell, state)[1] == pytest.approx([0.0, 0.0, 0.0], abs=1e-5)
         assert chords(mesh, state.equilibrium.configuration.r, 1) == pytest.approx(4.0, abs=1e-4)
-        assert np.abs(state.equilibrium.reaction[ends_along(mesh, 1)]).max() <= design.numerics.tolerance
+        assert np.abs(state.equilibrium.reaction[ends_along(mesh, 1)]).max() <= design.numerics.force_tolerance
 
 
 def test_three_crossings_hold_a_free_yarn_crimped() -> None:

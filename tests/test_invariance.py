@@ -19,10 +19,10 @@ from circuittex.design import Design
 from circuittex.electrical.fields import solve_fields
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.linear import LinearSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
+from circuittex.mech.pardiso import PardisoSolver
 from circuittex.relaxation.relax import Equilibrium, clamp_force, move, relax
-from circuittex.solvers.linear import LinearSolver
-from circuittex.solvers.multifrontal import MultifrontalSolver
-from circuittex.solvers.pardiso import PardisoSolver
 
 
 def usable() -> dict[str, type]:
@@ -46,7 +46,7 @@ import sys
 import numpy as np
 from fabrics import small_cell
 from test_invariance import SOLVERS
-from circuittex.solvers.pattern import build_pattern, diagonal
+from circuittex.mech.pattern import build_pattern, diagonal
 from circuittex.relaxation.relax import relax
 
 side = 28
@@ -111,7 +111,7 @@ def currents(design: Design, mesh: FibrilMesh, state: Equilibrium) -> Floats:
 
 @cache
 def cell() -> tuple[Design, FibrilMesh, list[Equilibrium]]:
-    design, mesh = small_cell((1, 2), elements=4, tolerance=TOLERANCE)
+    design, mesh = small_cell((1, 2), elements=4, tolerance=f"{TOLERANCE} N")
     return design, mesh, states(design, mesh, initial_configuration(mesh), MultifrontalSolver())
 
 

@@ -11,11 +11,11 @@ import pytest
 from beams import dense
 
 from circuittex.base.arrays import Floats
-from circuittex.solvers.coupled import Coupled, pair_of_entry
-from circuittex.solvers.linear import LinearSolver
-from circuittex.solvers.multifrontal import MultifrontalSolver
-from circuittex.solvers.pardiso import PardisoSolver
-from circuittex.solvers.pattern import Pattern, build_pattern, diagonal
+from circuittex.mech.coupled import Coupled, pair_of_entry
+from circuittex.mech.linear import LinearSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
+from circuittex.mech.pardiso import PardisoSolver
+from circuittex.mech.pattern import Pattern, build_pattern, diagonal
 
 
 def has(module: str) -> bool:

@@ -10,13 +10,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from test_fronts import patterns
 
+import circuittex.mech.multifrontal as multifrontal
+import circuittex.solvers.cholesky as cholesky
 import circuittex.solvers.elimination_tree as elimination_tree
 import circuittex.solvers.fronts as fronts
-import circuittex.solvers.multifrontal as multifrontal
-from circuittex.base.arrays import Floats, Ints
-from circuittex.solvers.coupled import pair_of_entry
-from circuittex.solvers.multifrontal import MultifrontalSolver
-from circuittex.solvers.pattern import Pattern, build_pattern, diagonal
+from circuittex.base.arrays import Floats
+from circuittex.mech.coupled import pair_of_entry
+from circuittex.mech.multifrontal import MultifrontalSolver, blocks
+from circuittex.mech.pattern import Pattern, build_pattern, diagonal
 
 costs = st.sampled_from([0.0, 300.0, 3e4, elimination_tree.FRONT])
 """From one part a front to one front for all that is connected."""
@@ -110,13 +111,11 @@ def test_fronts_follow_the_coupled_pairs_and_are_kept_while_they_hold_them(monke
     """Contacts of one pattern that open, close again and multiply: every solution is right, few need new fronts."""
     analysed = []
 
-    def counting(
-        pattern: Pattern, coupled: NDArray[np.bool_], entries: Ints, last: fronts.Analysis | None
-    ) -> fronts.Analysis:
+    def counting(pattern: Pattern, coupled: NDArray[np.bool_]) -> fronts.Blocks:
         analysed.append(int(coupled.sum()))
-        return fronts.analyse(pattern, coupled, entries, last)
+        return blocks(pattern, coupled)
 
-    monkeypatch.setattr(multifrontal, "analyse", counting)
+    monkeypatch.setattr(multifrontal, "blocks", counting)
     pattern, solver = grid(6), MultifrontalSolver()
     pair, whole = pair_of_entry(pattern), random_values(grid(6), 6, 0.1)
     point = np.flatnonzero(pattern.full_offset < 0)
@@ -140,11 +139,11 @@ def test_the_order_is_kept_while_it_serves() -> None:
         data = np.where(np.isin(pair, point[closed:]), 0.0, 1e-9)
         data[diagonal(pattern)] = 1.0
         assert solver.factor(pattern, data) is not None
-        assert solver._analysis is not None
-        found.append(solver._analysis)
-    assert np.array_equal(found[1].parts, found[0].parts)
+        assert solver._cholesky is not None
+        found.append(solver._cholesky.analysis)
+    assert np.array_equal(found[1].blocks, found[0].blocks)
     assert found[1].least == found[0].least
-    assert not np.array_equal(found[2].parts, found[0].parts)
+    assert not np.array_equal(found[2].blocks, found[0].blocks)
     assert found[2].least > fronts.WORTHWHILE * found[0].least
 
 
@@ -154,9 +153,9 @@ def test_one_front_is_the_dense_factor() -> None:
     data = random_values(pattern, 3, 0.5)
     solver = solver_for(pattern, np.inf)
     assert solver.factor(pattern, data) is not None
-    ((_, triangle, border),) = solver._blocks
-    assert solver._analysis is not None
-    order = solver._analysis.order
+    assert solver._cholesky is not None
+    ((_, triangle, border),) = solver._cholesky._dense
+    order = solver._cholesky.analysis.order
     expected = np.linalg.cholesky(dense(pattern, data)[np.ix_(order, order)]).T
     assert np.abs(np.triu(triangle) - expected).max() < 1e-12 * np.abs(expected).max()
     assert border.size == 0
@@ -172,10 +171,10 @@ def test_threads_change_no_bit(threads: int, monkeypatch: pytest.MonkeyPatch) ->
     bad[diagonal(pattern)[450]] = -1.0
     found = []
     for count in (1, *[threads] * 20):
-        monkeypatch.setattr(multifrontal, "cores", lambda count=count: count)
+        monkeypatch.setattr(cholesky, "cores", lambda count=count: count)
         solver = solver_for(pattern, 300.0)
-        assert solver._analysis is not None
-        assert len(solver._analysis.subtrees) > 10
+        assert solver._cholesky is not None
+        assert len(solver._cholesky.analysis.subtrees) > 10
         assert solver.factor(pattern, bad) is None
         solve = solver.factor(pattern, good)
         assert solve is not None
@@ -191,8 +190,8 @@ def test_an_error_in_a_thread_comes_out(error: type[Exception], monkeypatch: pyt
     solver, pattern = MultifrontalSolver(), grid(8)
     monkeypatch.setattr(elimination_tree, "SHARE", 1e-3)
     monkeypatch.setattr(elimination_tree, "FRONT", 0.0)
-    monkeypatch.setattr(multifrontal, "cores", lambda: 2)
-    monkeypatch.setattr(multifrontal, "_add", fail)
+    monkeypatch.setattr(cholesky, "cores", lambda: 2)
+    monkeypatch.setattr(cholesky, "_add", fail)
     with pytest.raises(error):
         solver.factor(pattern, random_values(pattern, 8, 0.1))
 

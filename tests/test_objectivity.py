@@ -41,7 +41,7 @@ def turned_mesh(mesh: FibrilMesh, turn: Floats) -> FibrilMesh:
 
 @cache
 def at_rest() -> tuple[Design, FibrilMesh, Equilibrium]:
-    design, mesh = small_cell((1, 2), elements=4, tolerance=TIGHT)
+    design, mesh = small_cell((1, 2), elements=4, tolerance=f"{TIGHT} N")
     return design, mesh, relax(mesh, design)
 
 

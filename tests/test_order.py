@@ -9,6 +9,8 @@ import pytest
 from fabrics import small_cell
 
 from circuittex.base.frozen import same
+from circuittex.design import Material
+from circuittex.design.declaration import keys
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.order import reordered
 
@@ -27,6 +29,7 @@ def uneven() -> FibrilMesh:
         elements=mesh.elements[:last],
         first_node=np.append(mesh.first_node[:-1], short),
         first_element=np.append(mesh.first_element[:-1], last),
+        material=np.arange(mesh.n_fibrils),
         **{name: number + 100 * place for place, name in enumerate(names.split())},
     )
 
@@ -37,7 +40,7 @@ def parts(mesh: FibrilMesh, fibril: int) -> tuple[np.ndarray | float, ...]:
     nodal = (getattr(mesh, name)[first:last] for name in ("position", "directors", "xi"))
     elements = mesh.elements[mesh.first_element[fibril] : mesh.first_element[fibril + 1]] - first
     tables = [f.name for f in fields(mesh) if getattr(getattr(mesh, f.name), "shape", ()) == (mesh.n_fibrils,)]
-    assert len(tables) == 8
+    assert len(tables) == 3 + len(keys(Material)) + 1
     return (*nodal, elements, *(getattr(mesh, name)[fibril] for name in tables))
 
 

@@ -22,6 +22,10 @@ MOST_ITERATIONS = 80
 SYMMETRY = 1e-5
 """Relative difference allowed between warp and weft forces, which a symmetry of the cell makes equal: the free
 residual of 1e-6 N on either side of a force of about 1 N, and its amplification by the softest mode."""
+PROTOTYPE, COARSE = 1.49, 0.05
+"""Clamp tension in N of the relaxed cell by an independent prototype with 16 linear elements and two contact points an
+element and side, and the relative error of so coarse a mesh: 2 % from 20 to 40 of our elements at most, and half the
+points."""
 
 
 @pytest.fixture(scope="module", params=["paper-code", "paper-table"])
@@ -66,12 +70,14 @@ def test_opposite_clamps_balance(cell: Cell) -> None:
 
 
 def test_tension_is_that_of_compacted_yarns(cell: Cell) -> None:
-    """Known: 0.2 to 0.4 N for Table I; with the code's modulus a prototype found 1.5 N and the wave carries 3.1 N."""
+    """Another program found 1.49 N for E = 10 MPa; softer fibrils at the same penalty are compacted less, so that they
+    keep at least that part of it, and no more than their initial wave carries."""
     force = clamp_force(cell.mesh, cell.relaxed.reaction)[0, 0]
     modulus = cell.design.weave.warp[0].materials[0].youngs_modulus
-    low, high = (1.3, 2.0) if modulus == 10 else (0.19, 0.4)
-    assert low <= force <= high
-    assert force < wave_force(cell.design)
+    least = PROTOTYPE * modulus / 10
+    assert (1 - COARSE) * least <= force < wave_force(cell.design)
+    if modulus == 10:
+        assert force == pytest.approx(PROTOTYPE, rel=COARSE)
 
 
 def test_initial_wave_carries_what_the_model_says() -> None:

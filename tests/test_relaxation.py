@@ -15,11 +15,12 @@ from circuittex.design import Design, plain_weave
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.linear import Solve
 from circuittex.mech.minimise import System, predict
+from circuittex.mech.multifrontal import MultifrontalSolver
+from circuittex.mech.pattern import Pattern
+from circuittex.mech.scales import fibril_scales
 from circuittex.relaxation.relax import Equilibrium, clamp_force, force_terms, move, relax
-from circuittex.solvers.linear import Solve
-from circuittex.solvers.multifrontal import MultifrontalSolver
-from circuittex.solvers.pattern import Pattern
 
 TIGHT = 1e-9  # N; clamp forces are some 0.1 N, so that results agree to 1e-7 and better
 AGREE = 1e-7  # of forces in N and positions in mm between runs that differ by round-off only
@@ -32,7 +33,7 @@ def solved(design: Design, mesh: FibrilMesh, start: Configuration | None = None)
 @pytest.fixture(scope="module")
 def cell() -> tuple[Design, FibrilMesh, Equilibrium]:
     """Three fibrils a yarn in two rows, relaxed."""
-    design, mesh = small_cell((1, 2), elements=6, tolerance=TIGHT)
+    design, mesh = small_cell((1, 2), elements=6, tolerance=f"{TIGHT} N")
     return design, mesh, solved(design, mesh)
 
 
@@ -45,7 +46,7 @@ def free_nodes(mesh: FibrilMesh) -> np.ndarray:
 
 def test_forces_balance(cell: Cell) -> None:
     design, mesh, equilibrium = cell
-    assert equilibrium.residual <= design.numerics.tolerance
+    assert equilibrium.residual <= design.numerics.force_tolerance
     assert np.abs(equilibrium.reaction[free_nodes(mesh)]).max() <= equilibrium.residual
     assert np.abs(equilibrium.reaction.sum(axis=0)).max() <= mesh.n_nodes * equilibrium.residual
     moment = np.cross(equilibrium.configuration.r, equilibrium.reaction).sum(axis=0)
@@ -91,7 +92,7 @@ def test_section_forces_at_the_ends_are_the_clamp_forces() -> None:
 
     P = mu (s - 1/s) with mu = E / 2, at a stretch s = 1.1.
     """
-    design, mesh = small_cell((1,), elements=4, tolerance=TIGHT)
+    design, mesh = small_cell((1,), elements=4, tolerance=f"{TIGHT} N")
     design = replace(design, contact=replace(design.contact, penalty=1e-12))
     flat = mesh.position * [1.0, 1.0, 0.0]
     mesh = replace(mesh, position=flat, directors=_level_directors(mesh))
@@ -154,7 +155,7 @@ def test_an_unconverged_state_is_never_returned(limit: int) -> None:
     with pytest.raises(ConvergenceError, match=f"no equilibrium after {limit} iterations") as caught:
         solved(design, mesh)
     assert caught.value.history.shape == (limit + 1, 4)
-    assert np.all(caught.value.history[:, 0] > design.numerics.tolerance)
+    assert np.all(caught.value.history[:, 0] > design.numerics.force_tolerance)
 
 
 def test_a_start_that_is_inside_out_is_an_error(cell: Cell) -> None:
@@ -242,7 +243,6 @@ def test_stiff_and_light_materials_relax_to_the_same_shape(modulus: float, densi
         soft,
         weave=replace(soft.weave, warp=(stiff_yarn,) * 2, weft=(stiff_yarn,) * 2),
         contact=replace(soft.contact, penalty=ratio * soft.contact.penalty),
-        numerics=replace(soft.numerics, tolerance=ratio * soft.numerics.tolerance),
     )
     energies = [relax(build_mesh(design), design).energy for design in (soft, stiff)]
     assert energies[1] / energies[0] == pytest.approx(ratio, rel=1e-6)  # residuals of 1e-6 of the forces
@@ -253,11 +253,12 @@ def test_a_prediction_is_of_second_order(cell: Cell) -> None:
     design, mesh, relaxed = cell
     space, beam, contact = force_terms(mesh, design)
     q, solver = space.vector(relaxed.configuration), MultifrontalSolver()
+    scales = fibril_scales(space, design.weave.pitch)
 
     def distances(strain: float) -> np.ndarray:
         moved = move(relaxed.configuration, np.eye(2), np.diag([1 + strain, 1.0]))
         to = space.vector(moved)
-        predicted = predict(System([beam, contact], beam.mass, space.fixed, len(q)), solver, q, to)
+        predicted = predict(System([beam, contact], scales, space.fixed, len(q)), solver, q, to)
         goal = relax(mesh, design, moved, before=relaxed.configuration, solver=solver).configuration.r
         return np.array([np.abs(r - goal).max() for r in (moved.r, space.configuration(predicted).r)])
 

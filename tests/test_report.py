@@ -28,6 +28,7 @@ from circuittex.results.report.template import render
 
 PNG = b"\x89PNG\r\n\x1a\nno real picture"
 STUDY = synthetic_study(3, contacts=40, name="<b>A & \"B\"</b> $HOME 'x'")
+NAMES = [record.name for record in STUDY.records]
 EMPTY_ELEMENTS = {"meta", "img", "br"}
 
 
@@ -77,10 +78,17 @@ def test_names_are_shown_as_they_are() -> None:
     assert STUDY.design.name in parsed(STUDY).text
 
 
+TABLES = ("Recorded states", "Clamp forces", "Equilibrium", "Energy", "Reduced network", "Verification")
+"""Headings below which every state has a row."""
+
+
 def test_numbers_are_in_the_tables() -> None:
     text = parsed(STUDY).text
+    headings = [text.index(heading) for heading in (*TABLES, "Parameters")]
+    assert headings == sorted(headings)
+    for heading, start, stop in zip(TABLES, headings, headings[1:], strict=False):
+        assert [name for name in text[start:stop] if name in NAMES] == NAMES, heading
     for record in STUDY.records:
-        assert text.count(record.name) == 6  # states, forces, equilibrium, energy, network, verification
         assert record.netlist in text
         assert f"{record.currents[2]:.4g}" in text
         assert f"{record.fit.Ry:.4g}" in text

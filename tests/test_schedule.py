@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from circuittex.base.errors import CircuittexError, ConvergenceError
 from circuittex.base.frozen import same
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.results.records import Record, Study
-from circuittex.solvers.multifrontal import MultifrontalSolver
 from circuittex.study import schedule
 from circuittex.study.plan import plan
 from circuittex.study.schedule import compute

@@ -51,8 +51,8 @@ def test_a_changed_estimate_is_noticed(tmp_path: Path) -> None:
     path = tmp_path / "results.h5"
     write_study_start(path, ESTIMATED)
     with h5py.File(path, "r+") as file:
-        file["errors/0001/quantities/0000"].attrs["value"] = 2.1
-    with pytest.raises(StoreError, match=r"error estimate 000[01] does not match its digest"):
+        next(iter(file["errors"].values()))["quantities/0000"].attrs["value"] = 2.1
+    with pytest.raises(StoreError, match=r"error estimate \S+ does not match its digest"):
         load_study(path)
 
 

@@ -22,9 +22,9 @@ from circuittex.base.errors import ConvergenceError, DesignError, FolderError, S
 from circuittex.base.frozen import same
 from circuittex.base.lock import locked
 from circuittex.design import Design, equal_steps, shear, uniaxial
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.results.store import load_study
 from circuittex.results.store.archive import Digests
-from circuittex.solvers.multifrontal import MultifrontalSolver
 from circuittex.study.run import run_study
 
 STUDY = canned_study(2)
@@ -113,7 +113,7 @@ def states(folder: Path) -> int:
     if not (folder / "results.h5").exists():
         return 0
     with h5py.File(folder / "results.h5", "r", locking=False) as file:
-        return len(file["records"])
+        return len(file["states"])
 
 
 def test_interrupted_then_killed_then_completed_by_other_numbers_of_workers(

@@ -17,7 +17,7 @@ import numpy as np
 
 from circuittex.base.compiled import compiled
 from circuittex.contact.curve import weights
-from circuittex.solvers.pattern import find_neighbour
+from circuittex.mech.pattern import find_neighbour
 
 
 @compiled

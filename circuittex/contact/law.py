@@ -44,6 +44,15 @@ def pair_penalty(mesh: FibrilMesh, law: ContactLaw, a: Ints, b: Ints) -> Floats:
     return np.where(np.isnan(stated), effective_modulus(e[a], nu[a], e[b], nu[b]) / 2, stated)
 
 
+def largest_penalty(mesh: FibrilMesh, law: ContactLaw) -> Floats:
+    """(F,) the largest P* of a fibril with any of those in the mesh, N/mm2."""
+    kinds = np.stack([mesh.youngs_modulus, mesh.poisson_ratio, *([mesh.material] if len(mesh.material) else [])])
+    _, first, kind = np.unique(kinds, axis=1, return_index=True, return_inverse=True)
+    a, b = np.repeat(first, len(first)), np.tile(first, len(first))
+    of_kind = pair_penalty(mesh, law, a, b).reshape(len(first), -1).max(axis=1)
+    return np.asarray(of_kind[kind.ravel()])
+
+
 def pair_conductivity(mesh: FibrilMesh, law: ContactLaw, a: Ints, b: Ints) -> Floats:
     """sigma_c (C,), S/mm2, of contacts between the fibrils a and b (C,); 0 where either of them insulates."""
     conducts = (mesh.electrical_conductivity[a] > 0) & (mesh.electrical_conductivity[b] > 0)

@@ -16,10 +16,13 @@ from circuittex.contact.law import pair_penalty
 from circuittex.contact.search import CONTROL_MOTION, Candidates, coupled_nodes, find_candidates
 from circuittex.design import ContactLaw
 from circuittex.geometry.mesh import FibrilMesh
-from circuittex.solvers.pattern import Pattern
+from circuittex.mech.pattern import Pattern
 
 WORTH_A_THREAD = 2000
 """Contacts that are worth a thread of their own."""
+SKIN = 8 / 15
+"""How far candidates reach beyond touch, in parts of the smallest radius: they last for as long as nothing moves by
+about a quarter of it."""
 CHUNKS = 16
 """Candidates are searched in this many pieces, whatever the number of threads."""
 
@@ -58,11 +61,12 @@ class PenaltyContact:
     """Energy sum over contact points of 1/2 P* w o^2; both fibrils of a pair carry points, with half weight.
 
     `law` gives P* of each pair (`pair_penalty`), `per_element` is the number of contact points of an element, `skin`
-    (mm) how far candidates reach beyond touch so that they last several iterations.
+    (mm) how far candidates reach beyond touch so that they last several iterations, by default `SKIN`.
     """
 
-    def __init__(self, mesh: FibrilMesh, *, law: ContactLaw, per_element: int, skin: float = 0.08) -> None:
-        self.mesh, self.law, self.skin = mesh, law, skin
+    def __init__(self, mesh: FibrilMesh, *, law: ContactLaw, per_element: int, skin: float | None = None) -> None:
+        self.mesh, self.law = mesh, law
+        self.skin = SKIN * float(mesh.radius.min()) if skin is None else skin
         self.table: CurveTable = curve_table(mesh)
         self.points = contact_points(mesh, per_element)
         size = mesh.length / np.diff(mesh.first_element) / per_element
@@ -87,7 +91,7 @@ class PenaltyContact:
         """Candidates that hold every pair in touch at r: since their search no Bézier point moved by half the skin."""
         for known in (self._held, self._tried):
             if known is not None:
-                moved = float(((r - known[1]) ** 2).sum(axis=1).max()) ** 0.5
+                moved = float(np.sqrt(((r - known[1]) ** 2).sum(axis=1).max()))
                 if CONTROL_MOTION * moved <= self.skin / 2:
                     return known
         self._tried = find_candidates(self.table, r, self.mesh.radius, self.skin), r

@@ -12,7 +12,8 @@ from scipy.spatial import cKDTree
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.frozen import frozen
 from circuittex.contact.curve import CurveTable, bezier
-from circuittex.solvers.pattern import distinct, ranges
+from circuittex.mech.pattern import distinct
+from circuittex.solvers.ranges import ranges
 
 CONTROL_MOTION = 4 / 3
 """A Bézier point moves at most this times as far as the nodes that define it (the sum of its weights' magnitudes)."""

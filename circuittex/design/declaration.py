@@ -14,7 +14,7 @@ from math import inf
 from textwrap import wrap
 from typing import Any
 
-from circuittex.design.checks import one_of, real, store, truth, whole
+from circuittex.design.checks import one_of, real, refuse, store, truth, whole
 from circuittex.design.table import Table, quantity
 
 _KEY = "key"
@@ -75,6 +75,25 @@ def number(
     allowed = ", ".join([*(f'"{word}"' for word in words), " and ".join(limits) or "any"])
     text = shown if _is_plain(shown) else f'"{shown}"'
     return _metadata(check, read, wanted, f"{allowed} {shown_unit}".strip(), text, note)
+
+
+def relative(unit: str, note: str, *, shown: str, at_most: float) -> Mapping[str, Key]:
+    """Metadata of a field with a pure number, in parts of something, or with a quantity in `unit`, kept as text.
+
+    >>> relative("N", "of forces", shown="1e-6", at_most=1)["key"].check("2 mN", "tolerance")
+    '0.002 N'
+    """
+
+    def check(value: object, path: str) -> object:
+        if isinstance(value, str):  # of any size: what it is compared with may be as small
+            size = quantity(value, unit, path)
+            if not size > 0.0:
+                raise refuse(path, value, f"it must be > 0 {unit}")
+            return f"{size!r} {unit}"
+        return real(value, path, f"or a text in {unit}", above=0, at_most=at_most)
+
+    wanted = f"a plain number or a string in {unit}"
+    return _metadata(check, _as_it_is, wanted, f"> 0 and <= {at_most:g}, or > 0 {unit}", shown, note)
 
 
 def count(note: str, at_least: int, at_most: int, *, shown: str, words: tuple[str, ...] = ()) -> Mapping[str, Key]:

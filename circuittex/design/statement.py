@@ -8,13 +8,16 @@ from dataclasses import field, fields, is_dataclass
 
 from circuittex.base.frozen import frozen, same
 from circuittex.design.checks import distinct, refuse, title
-from circuittex.design.declaration import check, choice, count, flag, number
+from circuittex.design.declaration import check, choice, count, flag, number, relative
 from circuittex.design.experiment import Loading, Probe, Terminal
 from circuittex.design.fabric import ContactLaw, Weave
 from circuittex.design.packing import Packing
+from circuittex.design.units import parse
 
 FORMAT = 1
 """The layout described by the starter design."""
+AUTO = "auto"
+"""Stands for a length that follows from the weave."""
 MOST_ELEMENTS = 500_000
 """Elements of a whole fabric: what a large workstation can hold."""
 
@@ -66,35 +69,48 @@ class Numerics:
     )
     """Degree of the section's quadrature rule. Below 6 its points tell how a fibril is spun about its axis, which
     a round fibril does not know, and the relaxation creeps along that spin."""
-    tolerance: float = field(
-        default=1e-6,
-        metadata=number("N", "largest free force that counts as equilibrium", shown="1e-6 N", above=0),
+    tolerance: float | str = field(
+        default=2e-5,
+        metadata=relative(
+            "N",
+            "largest free force that counts as equilibrium, in parts of the forces on its fibril; or in newtons",
+            shown="2e-5",
+            at_most=0.1,
+        ),
     )
-    """Largest free force at equilibrium, N."""
+    """Largest free force at equilibrium: a number in parts of the largest force on its fibril, a text such as
+    '1e-06 N' as it is. Of moments on directors half a pitch is the lever."""
     max_iterations: int = field(
         default=200,
         metadata=count("Newton iterations before a relaxation is given up or its step halved", 1, 100_000, shown="200"),
     )
     """Newton iterations before a relaxation is given up; an increment of a loading path is then made in halves."""
-    merge_length: float = field(
-        default=1.0,
+    merge_length: float | str = field(
+        default=AUTO,
         metadata=number(
             "mm",
-            "netlists: contacts of a fibril pair in bins of this length merge; 0: none",
-            shown="1 mm",
+            'netlists: contacts of a fibril pair in bins of this length merge; 0: none; "auto": half a pitch',
+            shown=AUTO,
             at_least=0,
+            words=(AUTO,),
         ),
     )
     """Contacts of a fibril pair within bins of this length become one resistor in the netlists, mm; 0 keeps all. At
-    most the length of the longest fibril."""
-    snap_length: float = field(
-        default=1e-3,
+    most the length of the longest fibril. 'auto': half a pitch."""
+    snap_length: float | str = field(
+        default=AUTO,
         metadata=number(
-            "mm", "netlists: feet closer than this on a fibril share a node; 0: none", shown="0.001 mm", at_least=0
+            "mm",
+            'netlists: feet closer than this on a fibril share a node; 0: none; "auto": 1/2000 of the pitch, or a '
+            "tenth of an element",
+            shown=AUTO,
+            at_least=0,
+            words=(AUTO,),
         ),
     )
     """Feet closer than this on a fibril share a node in the netlists, mm; 0 keeps all. At most a tenth of the
-    shortest element: feet that lie as far apart as contact points must stay apart."""
+    shortest element: feet that lie as far apart as contact points must stay apart. 'auto': that, or 1/2000 of the pitch
+    where it is less."""
     drop_fraction: float = field(
         default=1e-6,
         metadata=number(
@@ -110,6 +126,29 @@ class Numerics:
     def __post_init__(self) -> None:
         check(self, "numerics")
 
+    @property
+    def allowed(self) -> str:
+        """The tolerance in words, for a sentence.
+
+        >>> Numerics().allowed
+        '2e-05 of the forces on its fibril'
+        """
+        return self.tolerance if isinstance(self.tolerance, str) else f"{self.tolerance:g} of the forces on its fibril"
+
+    @property
+    def relative_tolerance(self) -> float:
+        """The tolerance in parts of the forces; 0 where it is stated in N."""
+        return 0.0 if isinstance(self.tolerance, str) else self.tolerance
+
+    @property
+    def force_tolerance(self) -> float:
+        """The tolerance in N; 0 where it is stated in parts of the forces.
+
+        >>> Numerics(tolerance="1 uN").force_tolerance
+        1e-06
+        """
+        return parse(self.tolerance, "N", "numerics.tolerance") if isinstance(self.tolerance, str) else 0.0
+
 
 @frozen
 class Design:
@@ -118,13 +157,21 @@ class Design:
     name: str
     """A title: any text without control characters."""
     weave: Weave
+    """The textile."""
     contact: ContactLaw
+    """How its fibrils touch."""
     loading: tuple[Loading, ...] = ()
+    """The loading paths, each from the relaxed state."""
     terminals: tuple[Terminal, ...] = ()
+    """Yarn ends whose fibril ends are joined."""
     probes: tuple[Probe, ...] = ()
+    """What is measured between terminals."""
     electrical: Electrical = Electrical()
+    """Choices of the electrical model."""
     numerics: Numerics = Numerics()
+    """Choices of the discretisation and of the solver."""
     packing: Packing = Packing()
+    """Random departures from the regular packing."""
 
     def __post_init__(self) -> None:
         title(self.name, "name")
@@ -157,15 +204,32 @@ class Design:
             raise refuse("numerics.elements", elements, allowed)
 
     def _check_lengths(self) -> None:
-        weave, numerics = self.weave, self.numerics
-        lengths = len(weave.warp) * weave.pitch, len(weave.weft) * weave.pitch
-        element, fibril = min(lengths) / numerics.elements, max(lengths)
-        if numerics.snap_length > element / 10:
-            allowed = f"it must be at most {element / 10:.4g} mm, a tenth of the shortest element"
-            raise refuse("numerics.snap_length", numerics.snap_length, allowed)
-        if numerics.merge_length > fibril:
+        weave, most = self.weave, self._largest_snap
+        fibril = max(len(weave.warp), len(weave.weft)) * weave.pitch
+        if self.snap_length > most:
+            allowed = f"it must be at most {most:.4g} mm, a tenth of the shortest element"
+            raise refuse("numerics.snap_length", self.snap_length, allowed)
+        if self.merge_length > fibril:
             allowed = f"it must be at most {fibril:.4g} mm, the length of the longest fibril"
-            raise refuse("numerics.merge_length", numerics.merge_length, allowed)
+            raise refuse("numerics.merge_length", self.merge_length, allowed)
+
+    @property
+    def _largest_snap(self) -> float:
+        """A tenth of the shortest element, mm."""
+        shortest = min(len(self.weave.warp), len(self.weave.weft)) * self.weave.pitch
+        return shortest / self.numerics.elements / 10
+
+    @property
+    def merge_length(self) -> float:
+        """`Numerics.merge_length` in mm."""
+        stated = self.numerics.merge_length
+        return self.weave.pitch / 2 if isinstance(stated, str) else stated
+
+    @property
+    def snap_length(self) -> float:
+        """`Numerics.snap_length` in mm."""
+        stated = self.numerics.snap_length
+        return min(self.weave.pitch / 2000, self._largest_snap) if isinstance(stated, str) else stated
 
     def _check_packing(self) -> None:
         # Beyond these no random packing keeps its fibrils apart, and a twist could not be followed by the mesh.

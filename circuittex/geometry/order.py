@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from circuittex.base.arrays import Ints
+from circuittex.design import Material
+from circuittex.design.declaration import keys
 from circuittex.geometry.mesh import FibrilMesh
 
 
@@ -26,7 +28,7 @@ def reordered(mesh: FibrilMesh, order: Ints) -> tuple[FibrilMesh, Ints]:
     nodes = np.concatenate([np.arange(mesh.first_node[f], mesh.first_node[f + 1]) for f in order])
     old = np.concatenate([np.arange(mesh.first_element[f], mesh.first_element[f + 1]) for f in order])
     place = np.argsort(nodes)
-    tables = "yarn length radius youngs_modulus poisson_ratio density electrical_conductivity thermal_conductivity"
+    tables = ["yarn", "length", "radius", *keys(Material), *(["material"] if len(mesh.material) else [])]
     other = replace(
         mesh,
         position=mesh.position[nodes],
@@ -35,6 +37,6 @@ def reordered(mesh: FibrilMesh, order: Ints) -> tuple[FibrilMesh, Ints]:
         elements=place[mesh.elements[old]],
         first_node=np.concatenate([[0], np.cumsum(counts)]),
         first_element=np.concatenate([[0], np.cumsum(elements)]),
-        **{name: getattr(mesh, name)[order] for name in tables.split()},
+        **{name: getattr(mesh, name)[order] for name in tables},
     )
     return other, nodes

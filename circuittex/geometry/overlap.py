@@ -15,7 +15,7 @@ from circuittex.geometry.centre_lines import centre_lines
 
 _SAMPLES = 16  # chords a crossing; in the paper's cell they leave the curve by 0.003 mm at the most
 _CHUNK = 50_000  # chords searched at a time, which bounds the memory
-_SLACK = 1e-6  # mm: a start of exactly one radius is allowed whatever the rounding
+_SLACK = 1e-5  # of the smallest radius: a start of exactly one radius is allowed whatever the rounding
 
 
 def check_overlaps(weave: Weave, packing: Packing = Packing()) -> None:  # noqa: B008 (frozen)
@@ -39,7 +39,7 @@ def check_overlaps(weave: Weave, packing: Packing = Packing()) -> None:  # noqa:
         worst = int(np.argmax(excess))
         if excess[worst] > deepest:
             deepest, pair = float(excess[worst]), (int(first[worst]), int(second[worst]))
-    if deepest > _SLACK:
+    if deepest > _SLACK * float(radius.min()):
         raise _refusal(weave, packing, lines.yarn, min(pair), max(pair), deepest)
 
 

@@ -12,10 +12,11 @@ from circuittex.base.compiled import cores, side_by_side
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.kernels import N_STRAINS, beam_energy, section_force
 from circuittex.mech.material import bending_lambda, lame
+from circuittex.mech.pattern import DOFS, Pattern
+from circuittex.mech.scales import line_matrix
 from circuittex.mech.section import disk_rule
 from circuittex.mech.space import BeamSpace
 from circuittex.mech.tangent import add_tangent
-from circuittex.solvers.pattern import DOFS, Pattern, add_elements
 
 WORTH_A_THREAD = 200
 """Elements whose assembly takes several times as long as it takes to start a thread."""
@@ -132,25 +133,9 @@ class Beam:
 
     def mass(self, pattern: Pattern) -> Floats:
         """(nnz,) consistent mass matrix [34], rotary terms included: g for positions, g mm2 for directors."""
-        mesh, fibril = self.space.mesh, self.space.mesh.element_fibril
-        n = self.nodes.shape[1]
-        line = (mesh.density * mesh.area)[fibril]
-        inertia = np.stack([line, line * mesh.radius[fibril] ** 2 / 4, line * mesh.radius[fibril] ** 2 / 4], axis=1)
-        matrix = np.zeros((len(fibril), n, DOFS, n, DOFS))
-        k = np.arange(DOFS)
-        matrix[:, :, k, :, k] = np.moveaxis(self.space.mass_line[..., None] * inertia[:, None, None, k // 3], -1, 0)
-        data = np.zeros(pattern.nnz)
-        add_elements(
-            self.nodes,
-            matrix,
-            pattern.indptr,
-            pattern.neighbour_start,
-            pattern.neighbour,
-            pattern.point_offset,
-            pattern.full_offset,
-            data,
-        )
-        return data
+        mesh = self.space.mesh
+        line = mesh.density * mesh.area
+        return line_matrix(self.space, pattern, line, line * mesh.radius**2 / 4)
 
 
 def _straight(space: BeamSpace) -> tuple[Floats, Floats]:

@@ -27,11 +27,12 @@ from circuittex.base.arrays import Floats, Ints
 from circuittex.base.errors import ConvergenceError, DesignError
 from circuittex.base.frozen import frozen
 from circuittex.mech.beam import Beam
+from circuittex.mech.linear import LinearSolver
 from circuittex.mech.minimise import minimise
+from circuittex.mech.pattern import DOFS, Pattern, multiply
+from circuittex.mech.scales import Scales
 from circuittex.mech.space import BeamSpace
 from circuittex.mech.terms import ForceTerm
-from circuittex.solvers.linear import LinearSolver
-from circuittex.solvers.pattern import DOFS, Pattern, multiply
 
 NEWTON = 1e-6
 """N in one g mm/s2: turns the mass matrix into N s2/mm."""
@@ -59,7 +60,7 @@ class Instant:
     kinetic: float
     """Kinetic energy 1/2 v.M v, N mm."""
     residual: float
-    """Largest magnitude of the gradient on the free unknowns, N: how far from equilibrium."""
+    """Largest magnitude of the gradient on the free unknowns, N, moments over the lever: how far from equilibrium."""
     iterations: int
     """Newton iterations of this step."""
 
@@ -152,18 +153,19 @@ def march(
     q: Floats,
     velocity: Floats,
     *,
+    scales: Scales,
     mass: MatrixOf,
     damping: MatrixOf,
     fixed: Ints,
     solver: LinearSolver,
     dt: float,
-    tolerance: float = 1e-6,
+    tolerance: float,
     max_iterations: int = 100,
 ) -> Iterator[Instant]:
     """Endless steps of backward Euler of `dt` seconds from q (n_dofs,) and `velocity` (n_dofs,), one by one.
 
     The `fixed` unknowns keep their initial velocity; each step is solved until no free force exceeds
-    `tolerance` (N). `mass` gives the mass matrix in g, `damping` its matrix in N s/mm.
+    `tolerance` (N), by what the `scales` call small. `mass` gives the mass matrix in g, `damping` its matrix in N s/mm.
 
     Raises `ConvergenceError` where a step is not solved in `max_iterations`.
     """
@@ -178,10 +180,11 @@ def march(
             [*terms, inertia],
             # Where supports move the body goes along; else a start at q is sure to lower the potential.
             q + dt * velocity if driven else q,
-            mass=mass,
+            scales=scales,
             fixed=fixed,
             solver=solver,
-            tolerance=tolerance,
+            tolerance=0.0,
+            force_tolerance=tolerance,
             max_iterations=max_iterations,
         )
         velocity, q = np.where(free, (found.q - q) / dt, velocity), found.q
@@ -193,7 +196,7 @@ def march(
             gradient=gradient,
             energy=found.energy - inertia.energy(q),
             kinetic=inertia.kinetic(velocity),
-            residual=float(np.abs(gradient[free]).max()),
+            residual=float(scales.forces(np.where(free, gradient, 0.0)).max()),
             iterations=found.iterations,
         )
 
@@ -212,6 +215,7 @@ def relax_dynamically(
     terms: Sequence[ForceTerm],
     q: Floats,
     *,
+    scales: Scales,
     mass: MatrixOf,
     damping: MatrixOf,
     fixed: Ints,
@@ -220,7 +224,7 @@ def relax_dynamically(
     t_relax: float,
     t_step: float = 0.0,
     velocity: Floats | None = None,
-    tolerance: float = 1e-6,
+    tolerance: float,
     max_iterations: int = 100,
 ) -> Rest:
     """Step 1 of Algorithm 1: move for `t_step`, stop, and relax with damping until at rest.
@@ -238,6 +242,7 @@ def relax_dynamically(
     motion = partial(
         march,
         terms,
+        scales=scales,
         mass=mass,
         fixed=fixed,
         solver=solver,

@@ -15,9 +15,9 @@ from circuittex.base.frozen import frozen
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.material import bending_lambda, lame
+from circuittex.mech.pattern import DOFS
 from circuittex.mech.section import disk_rule
 from circuittex.mech.space import ALONG, beam_space, vector_basis
-from circuittex.solvers.pattern import DOFS
 
 
 @frozen

@@ -1,30 +1,34 @@
 """Equilibrium as a minimum of the total potential: Newton's method that minimises.
 
-Each iteration solves (K + tau M) dq = -g with the exact tangent K, the mass matrix M and a shift tau, then
-searches along dq for a lower potential. Where the factorisation meets a negative pivot, part of the tangent's
-softening is left out, and where that does not help tau grows; it shrinks while full steps succeed. This is
-dynamic relaxation with a step that adapts: a shift tau is a step of backward Euler with dt = tau^(-1/2) from
-rest. The iteration knows no physics; forces are `ForceTerm`s.
+Each iteration solves (K + tau M) dq = -g with the exact tangent K, a stiffness M of the fibrils themselves
+(`Scales.metric`) and a shift tau, then searches along dq for a lower potential. Where the factorisation meets a
+negative pivot, part of the tangent's softening is left out, and where that does not help tau grows; it shrinks while
+full steps succeed. This is dynamic relaxation with a step that adapts: a shift is a step of backward Euler from rest,
+with a mass that has nothing to do with the fibrils' own. The iteration knows no physics; forces are `ForceTerm`s, and
+what is much or little the `Scales` say: all numbers below are pure ones.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats, Ints
+from circuittex.base.compiled import compiled
 from circuittex.base.errors import ConvergenceError
 from circuittex.base.frozen import frozen
+from circuittex.mech.linear import LinearSolver, Solve
+from circuittex.mech.pattern import DOFS, Pattern, build_pattern, diagonal, multiply
+from circuittex.mech.scales import Scales
 from circuittex.mech.terms import ForceTerm
-from circuittex.solvers.linear import LinearSolver, Solve
-from circuittex.solvers.pattern import Pattern, build_pattern, diagonal, multiply
 
-FIRST_SHIFT, LEAST_SHIFT = 1e-2, 1e-5
-"""Shifts, N/mm per g. The least keeps the fibrils' free spin about their axes, a true zero mode, solvable; it is a
-thousand times softer than the softest bending mode of the paper's fibrils."""
+FIRST_SHIFT, LEAST_SHIFT = 1.0, 1e-3
+"""Shifts, in parts of `Scales.metric`. The least keeps the fibrils' free spin about their axes, a true zero mode,
+solvable; it is a hundred thousand times softer than the softest bending mode of a span."""
 SOFTENING = (1.0, 0.7, 0.3)
 """Parts of the softening tangent that are tried far from equilibrium, where a descent through sliding contacts
 takes fewer iterations with less of it than with a larger shift alone. The search begins one place before the part
@@ -36,13 +40,16 @@ ROUGH = 0.02
 """Far from equilibrium the largest free force exceeds this part of the largest force of all. Nearer, only the whole
 tangent will do: with less of it the convergence is linear, and may end at a saddle."""
 LARGEST_SHIFT = 1e3
-"""Largest shift tried, in parts of the largest stiffness over mass of an unknown: it leaves nothing of the tangent."""
+"""Largest shift tried, in parts of the largest stiffness of an unknown over its metric: it leaves nothing of the
+tangent."""
 INVERSE_ITERATIONS = 12
 """Enough for the lowest mode to lead: its curvature and the shift nearly cancel."""
 FIRST_ESCAPE = 1e-4
-"""First step away from a saddle: largest change of an unknown, mm or one."""
+"""First step away from a saddle: largest change of an unknown, in its unit."""
 ROUND_OFF = 1e-13
 """Relative change of the potential that is round-off of its sum rather than an increase."""
+ROUNDED = 16 * float(np.finfo(float).eps)
+"""Part of stiffness times coordinate that is round-off of a force: where nothing else acts, as little is none."""
 ARMIJO = 1e-4
 """A step must achieve this part of the decrease that the slope promises (Nocedal & Wright, 3.1)."""
 
@@ -59,7 +66,7 @@ class Minimum:
     energy: float
     """Potential, N mm."""
     residual: float
-    """Largest magnitude of the gradient on the free unknowns, N."""
+    """Largest magnitude of the gradient on the free unknowns, N; moments on directors over the lever."""
     iterations: int
     """Linear systems solved: Newton iterations, and one for the prediction where there was one."""
     history: Floats
@@ -68,68 +75,106 @@ class Minimum:
 
 @dataclass
 class System:
-    """Pattern, mass and the values assembled in it; renewed when a term's couplings change."""
+    """Pattern, metric and the values assembled in it; renewed when a term's couplings change."""
 
     terms: Sequence[ForceTerm]
-    mass_of: Callable[[Pattern], Floats]
+    scales: Scales
     fixed: Ints
     n: int
     pattern: Pattern | None = None
-    mass: Floats = field(default_factory=lambda: np.empty(0))
+    metric: Floats = field(default_factory=lambda: np.empty(0))
+    scaling: Floats = field(default_factory=lambda: np.empty(0))
     data: Floats = field(default_factory=lambda: np.empty(0))
     softening: Floats = field(default_factory=lambda: np.empty(0))
+    forces: Floats = field(default_factory=lambda: np.empty(0))
     largest_shift: float = 0.0
     held: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     def assemble(self, q: Floats) -> tuple[Pattern, float, Floats]:
         changed = [term.prepare(q) for term in self.terms]
         if self.pattern is None or any(changed):
-            pairs = [term.pairs() for term in self.terms]
-            full, point = (np.concatenate([p[k] for p in pairs]) for k in (0, 1))
-            self.pattern = build_pattern(self.n // 9, full, point, q.reshape(-1, 9)[:, :3].copy())
-            self.mass = self.mass_of(self.pattern)
-            rows = np.repeat(np.arange(self.n), np.diff(self.pattern.indptr))
-            is_fixed = np.zeros(self.n, dtype=bool)
-            is_fixed[self.fixed] = True
-            self.held = np.flatnonzero(is_fixed[rows] | is_fixed[self.pattern.indices])
+            self.pattern = self._renewed(q)
         gradient, self.data, self.softening = np.zeros(self.n), np.zeros(self.pattern.nnz), np.zeros(self.pattern.nnz)
-        tangent = self.data, self.softening
-        energy = sum(term.assemble(q, self.pattern, gradient, *tangent) for term in self.terms)
+        self.forces, energy = np.zeros(len(self.scales.first_node) - 1), 0.0
+        for term in self.terms:
+            others = gradient.copy()
+            energy += term.assemble(q, self.pattern, gradient, self.data, self.softening)
+            self.forces = np.maximum(self.forces, self.scales.forces(gradient - others))
         return self.pattern, energy, gradient
 
+    def _renewed(self, q: Floats) -> Pattern:
+        pairs = [term.pairs() for term in self.terms]
+        full, point = (np.concatenate([p[k] for p in pairs]) for k in (0, 1))
+        pattern = build_pattern(self.n // DOFS, full, point, q.reshape(-1, DOFS)[:, :3].copy())
+        self.metric = self.scales.metric(pattern)
+        rows = np.repeat(np.arange(self.n), np.diff(pattern.indptr))
+        unit = self.scales.binary_unit
+        self.scaling = unit[rows] * unit[pattern.indices] / self.scales.energy
+        is_fixed = np.zeros(self.n, dtype=bool)
+        is_fixed[self.fixed] = True
+        self.held = np.flatnonzero(is_fixed[rows] | is_fixed[pattern.indices])
+        return pattern
+
     def factor(self, solver: LinearSolver, shift: float, softening: float) -> Solve | None:
+        """The shifted tangent's factor, None where it is not positive definite.
+
+        Its roots would be rounded otherwise at another scale, so what is factorised has no unit.
+        """
         assert self.pattern is not None
-        values = self.data + softening * self.softening + shift * self.mass
+        values = np.empty(self.pattern.nnz)
+        _shifted(self.data, softening, self.softening, shift, self.metric, self.scaling, values)
         values[self.held] = 0.0
         values[diagonal(self.pattern)[self.fixed]] = 1.0
-        return solver.factor(self.pattern, values)
+        solve, unit, energy = solver.factor(self.pattern, values), self.scales.binary_unit, self.scales.energy
+        return None if solve is None else lambda force: unit * solve(unit * force / energy)
+
+    def limits(self, q: Floats, tolerance: float, force_tolerance: float) -> Floats:
+        """(F,) the free force, N, up to which each fibril is in equilibrium: see `minimise`."""
+        if tolerance == 0.0:
+            return np.full_like(self.forces, force_tolerance)
+        assert self.pattern is not None
+        stiffness = self.data[diagonal(self.pattern)].reshape(-1, DOFS)[:, :3].max(axis=1)
+        rounded = ROUNDED * stiffness * np.abs(q).reshape(-1, DOFS)[:, :3].max(axis=1)
+        own = tolerance * np.minimum(self.forces, self.scales.largest_force)
+        return np.maximum(own, np.maximum(self.scales.over_fibrils(rounded), force_tolerance))
 
     def energy(self, q: Floats) -> float:
         return sum(term.energy(q) for term in self.terms)
+
+
+@compiled
+def _shifted(data: Any, part: float, softening: Any, shift: float, metric: Any, scaling: Any, values: Any) -> None:
+    """Fill values (nnz,) with (data + part softening + shift metric) scaling."""
+    for k in range(values.shape[0]):
+        values[k] = (data[k] + part * softening[k] + shift * metric[k]) * scaling[k]
 
 
 def minimise(
     terms: Sequence[ForceTerm],
     q: Floats,
     *,
-    mass: Callable[[Pattern], Floats],
+    scales: Scales,
     fixed: Ints,
     solver: LinearSolver,
     before: Floats | None = None,
-    tolerance: float = 1e-6,
+    tolerance: float = 2e-5,
+    force_tolerance: float = 0.0,
     max_iterations: int = 200,
     report: Callable[[int, float], None] | None = None,
 ) -> Minimum:
     """The minimum of the terms' total potential that a descent from q (n_dofs,) reaches.
 
-    `mass` gives the mass matrix in a pattern; `fixed` are the prescribed unknowns, kept as they are in q; where q was
-    moved from the minimum `before`, the descent starts from what that predicts (`predict`); `tolerance` (N) bounds the
-    largest free force; `report` is told of every iteration.
+    `fixed` are the prescribed unknowns, kept as they are in q; where q was moved from the minimum `before`, the descent
+    starts from what that predicts (`predict`); `report` is told of every iteration and its largest free force, N.
 
-    Raises `ConvergenceError`, with the history, where the tolerance is not met in `max_iterations`: an
+    On each fibril `tolerance` bounds the largest free force, in parts of the largest force with which one of the terms
+    acts on a node of it, or round-off does; `force_tolerance` (N) does so where that allows more, or alone where the
+    other is 0.
+
+    Raises `ConvergenceError`, with the history, where that is not met at a minimum in `max_iterations`: an
     unconverged state is never returned.
     """
-    system = System(terms, mass, fixed, len(q))
+    system = System(terms, scales, fixed, len(q))
     if before is not None:
         q = predict(system, solver, before, q)
     shift, part, refused, step, history = FIRST_SHIFT, 0, False, 1.0, []
@@ -138,24 +183,26 @@ def minimise(
     for iteration in range(max_iterations + 1):
         pattern, energy, gradient = system.assemble(q)
         if iteration == 0:
-            stiffness, inertia = (values[diagonal(pattern)][free] for values in (system.data, system.mass))
-            system.largest_shift = LARGEST_SHIFT * float((stiffness / inertia).max())
-        residual = float(np.abs(gradient[free]).max())
+            stiffness, metric = (values[diagonal(pattern)][free] for values in (system.data, system.metric))
+            system.largest_shift = LARGEST_SHIFT * float((stiffness / metric).max())
+        left, largest = scales.forces(np.where(free, gradient, 0.0)), float(scales.forces(gradient).max())
+        residual, limits = float(left.max()), system.limits(q, tolerance, force_tolerance)
         history.append((residual, energy, shift, step))
         if report is not None:
             report(iteration, residual)
         if not np.isfinite(energy):
             raise ConvergenceError("the potential is infinite: a fibril's section is inside out", np.array(history))
-        if residual <= tolerance and system.factor(solver, FIRST_SHIFT, 1.0) is not None:
+        balanced = bool((left <= limits).all())
+        if balanced and system.factor(solver, FIRST_SHIFT, 1.0) is not None:
             solves = iteration + (before is not None)
             return Minimum(q, gradient, energy, residual, solves, np.array(history))
         if iteration == max_iterations:
             break
-        rough = residual > ROUGH * np.abs(gradient).max()
+        rough = residual > ROUGH * largest
         parts = SOFTENING[part if refused or part == 0 else part - 1 :] if rough else SOFTENING[:1]
         shift, part, solve = _positive(system, solver, shift, parts, history)
         refused = SOFTENING[part] != parts[0]
-        if shift > FIRST_SHIFT and residual < SADDLE * np.abs(gradient).max():
+        if shift > FIRST_SHIFT and residual < SADDLE * largest:
             lower = _escape(system, pattern, solve, q, energy, free)
             if lower is not None:
                 q, step, shift = lower, 1.0, FIRST_SHIFT
@@ -170,8 +217,11 @@ def minimise(
             continue
         q = q + step * direction
         shift = max(LEAST_SHIFT, shift / 4) if step == 1.0 else (shift if step >= 0.25 else 4 * shift)
-    message = f"no equilibrium after {len(history) - 1} iterations: the largest free force is {residual:.3g} N"
-    raise ConvergenceError(f"{message}, {tolerance:.3g} N was asked for", np.array(history))
+    trouble = "the forces balance, but the tangent is not positive definite: a saddle, not a minimum"
+    if not balanced:
+        worst = int(np.argmax(left - limits))
+        trouble = f"a free force of {left[worst]:.3g} N is left, above the limit of {limits[worst]:.3g} N"
+    raise ConvergenceError(f"no equilibrium after {len(history) - 1} iterations: {trouble}", np.array(history))
 
 
 def predict(system: System, solver: LinearSolver, q: Floats, moved: Floats) -> Floats:
@@ -219,10 +269,11 @@ def _escape(
 
     Of the two senses the one that leads lower is taken; the step doubles for as long as that pays.
     """
-    mode = np.where(free, np.random.default_rng(0).standard_normal(len(q)), 0.0)
+    unit = system.scales.unit
+    mode = np.where(free, unit * np.random.default_rng(0).standard_normal(len(q)), 0.0)
     for _ in range(INVERSE_ITERATIONS):
-        mode = np.where(free, solve(np.where(free, multiply(pattern, system.mass, mode), 0.0)), 0.0)
-        mode /= np.abs(mode).max()
+        mode = np.where(free, solve(np.where(free, multiply(pattern, system.metric, mode), 0.0)), 0.0)
+        mode /= np.abs(mode / unit).max()
     best, lowest = None, energy
     for sense in (-1.0, 1.0):
         step = FIRST_ESCAPE

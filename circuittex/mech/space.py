@@ -12,7 +12,7 @@ from circuittex.base.frozen import frozen
 from circuittex.design.checks import one_of
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
-from circuittex.solvers.pattern import DOFS
+from circuittex.mech.pattern import DOFS
 
 ALONG = {1: [0, 1], 2: [0, 2, 1]}
 """scikit-fem's numbers of the nodes along an element, for each order: a middle node is its last."""

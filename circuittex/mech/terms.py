@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from circuittex.base.arrays import Floats, Ints
-from circuittex.solvers.pattern import Pattern
+from circuittex.mech.pattern import Pattern
 
 
 class ForceTerm(Protocol):

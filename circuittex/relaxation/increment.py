@@ -13,8 +13,8 @@ from circuittex.base.frozen import frozen
 from circuittex.design import Design
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
+from circuittex.mech.linear import LinearSolver
 from circuittex.relaxation.relax import Equilibrium, move, relax
-from circuittex.solvers.linear import LinearSolver
 
 SMALLEST = Fraction(1, 64)
 """Smallest part of an increment that is tried before the path is given up."""

@@ -8,15 +8,17 @@ import numpy as np
 
 from circuittex.base.arrays import Floats
 from circuittex.base.frozen import frozen, same
+from circuittex.contact.law import largest_penalty
 from circuittex.contact.penalty import PenaltyContact
 from circuittex.design import Design
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.linear import LinearSolver
 from circuittex.mech.minimise import minimise
+from circuittex.mech.multifrontal import MultifrontalSolver
+from circuittex.mech.scales import fibril_scales
 from circuittex.mech.space import BeamSpace, beam_space
-from circuittex.solvers.linear import LinearSolver
-from circuittex.solvers.multifrontal import MultifrontalSolver
 
 
 @frozen
@@ -31,11 +33,11 @@ class Equilibrium:
     energy: float
     """Stored elastic and contact energy, N mm."""
     residual: float
-    """Largest free-dof force, N."""
+    """Largest free force, N; moments on directors over half a pitch."""
     iterations: int
     """Linear systems solved: Newton iterations, and one for the prediction where there was one."""
     history: Floats
-    """(Newton iterations + 1, 4) residual N, potential N mm, shift N/(mm g), step length."""
+    """(Newton iterations + 1, 4) residual N, potential N mm, shift (`minimise`), step length."""
 
 
 def force_terms(mesh: FibrilMesh, design: Design, free: str = "") -> tuple[BeamSpace, Beam, PenaltyContact]:
@@ -70,11 +72,12 @@ def relax(
     minimum = minimise(
         [beam, contact],
         space.vector(start),
-        mass=beam.mass,
+        scales=fibril_scales(space, design.weave.pitch, largest_penalty(mesh, design.contact)),
         fixed=space.fixed,
         solver=solver if solver is not None else MultifrontalSolver(),
         before=space.vector(before) if before is not None and moved else None,
-        tolerance=design.numerics.tolerance,
+        tolerance=design.numerics.relative_tolerance,
+        force_tolerance=design.numerics.force_tolerance,
         max_iterations=design.numerics.max_iterations,
         report=report,
     )

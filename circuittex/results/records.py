@@ -42,7 +42,7 @@ class Record:
     parts: int
     """Parts into which the increment to this state was halved; 1 where it converged as a whole."""
     history: Floats
-    """(n, 4) per iteration of the last part: residual N, energy N mm, shift N/(mm g), step length."""
+    """(n, 4) per iteration of the last part: residual N, energy N mm, shift (`minimise`), step length."""
     clamp_force: Floats
     """(2, 3) total force of the clamps on the +x ends of the warp and the +y ends of the weft, N [40, 41]."""
     end_force: Floats

@@ -1,8 +1,8 @@
 """The order in which the unknowns of a sparse matrix are eliminated: nested dissection in space.
 
-A *separator* is a set of parts (`circuittex.solvers.fronts`) without which the others fall into two halves that are not
-coupled (George, SIAM Journal on Numerical Analysis 10, 1973). Eliminated after both, it keeps the fill of one out of
-the other. In a woven cell the cuts that cross the fewest fibrils run between yarns: where the nodes are tells where
+A *separator* is a set of blocks (`circuittex.solvers.fronts`) without which the others fall into two halves that are
+not coupled (George, SIAM Journal on Numerical Analysis 10, 1973). Eliminated after both, it keeps the fill of one out
+of the other. In a woven cell the cuts that cross the fewest fibrils run between yarns: where the nodes are tells where
 to look for them. Of all separators close to such a cut the narrowest is the minimum cut of a network (Menger; Ford &
 Fulkerson), which leaves a third less to do. Halves are dissected again; what is small enough is left to minimum
 degree.
@@ -23,13 +23,13 @@ from circuittex.base.arrays import Floats, Ints
 SMALL = 3000
 """Unknowns that are not dissected any more."""
 CUTS = (0.5, 0.45, 0.55, 0.4, 0.6)
-"""Where cuts are tried along an axis: the fraction of the parts that lies before them. The first of equals counts."""
+"""Where cuts are tried along an axis: the fraction of the blocks that lies before them. The first of equals counts."""
 
 
 def dissect(graph: sp.csr_array, width: Ints, position: Floats) -> Ints:
-    """The parts (n,) in the order of elimination.
+    """The blocks (n,) in the order of elimination.
 
-    `graph` (n, n) has ones where two different parts are coupled; `width` (n,) counts the unknowns of each, `position`
+    `graph` (n, n) has ones where two different blocks are coupled; `width` (n,) counts the unknowns of each, `position`
     (n, 3) tells where they are, mm.
 
     >>> chain = sp.diags_array([np.ones(4), np.ones(4)], offsets=[-1, 1]).tocsr()
@@ -43,10 +43,10 @@ def dissect(graph: sp.csr_array, width: Ints, position: Floats) -> Ints:
         return minimum_degree(graph)
     cut = narrowed(graph, width, cut)
     orders = []
-    for part in cut:
-        chosen = np.flatnonzero(part)
+    for block in cut:
+        chosen = np.flatnonzero(block)
         within = graph[chosen][:, chosen]
-        order = minimum_degree(within) if part is cut[-1] else dissect(within, width[chosen], position[chosen])
+        order = minimum_degree(within) if block is cut[-1] else dissect(within, width[chosen], position[chosen])
         orders.append(chosen[order])
     return np.concatenate(orders)
 
@@ -54,7 +54,7 @@ def dissect(graph: sp.csr_array, width: Ints, position: Floats) -> Ints:
 def _best_cut(graph: sp.csr_array, width: Ints, position: Floats) -> list[NDArray[np.bool_]] | None:
     """Two halves and their separator, (n,) each, for the cut with the narrowest separator; None where there is none.
 
-    Of each cut that side is the separator, the parts at its edge, which is narrower.
+    Of each cut that side is the separator, the blocks at its edge, which is narrower.
     """
     i, j = np.repeat(np.arange(len(width)), np.diff(graph.indptr)), graph.indices
     best, narrowest = None, width.sum() / 4  # where no cut is narrower, minimum degree does better
@@ -74,7 +74,7 @@ def _best_cut(graph: sp.csr_array, width: Ints, position: Floats) -> list[NDArra
 def narrowed(graph: sp.csr_array, width: Ints, cut: Sequence[NDArray[np.bool_]]) -> list[NDArray[np.bool_]]:
     """Two halves and their separator, (n,) each, with the narrowest separator among that of `cut` and its neighbours.
 
-    Each part of this band is an edge of the capacity of its width, from its entry to its exit. Coupled parts are joined
+    Each block of this band is an edge of the capacity of its width, from entry to exit. Coupled blocks are joined
     without limit, exit to entry, and so is the band with the halves beside it, source and sink. The edges that a
     maximum flow from one half to the other fills, the first on every way, are the separator.
     """
@@ -103,7 +103,7 @@ def narrowed(graph: sp.csr_array, width: Ints, cut: Sequence[NDArray[np.bool_]])
 
 
 def minimum_degree(graph: sp.csr_array) -> Ints:
-    """The parts in SuperLU's order of minimum degree, which SciPy gives away with a factorisation only."""
+    """The blocks in SuperLU's order of minimum degree, which SciPy gives away with a factorisation only."""
     laplacian = sp.diags_array(graph.sum(axis=0) + 1.0) - graph
     options = {"SymmetricMode": True, "Equil": False}
     lu = splu(laplacian.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)

@@ -1,7 +1,7 @@
-"""The elimination tree of a sparse matrix: what each of its parts is coupled to when its turn comes (Liu, SIAM Journal
-on Matrix Analysis and Applications 11, 1990), and which parts are best eliminated together, as one front.
+"""The elimination tree of a sparse matrix: what each of its blocks is coupled to when its turn comes (Liu, SIAM Journal
+on Matrix Analysis and Applications 11, 1990), and which blocks are best eliminated together, as one front.
 
-Parts are numbered by their turns here. A front takes in those below it as long as that saves time: dense matrices that
+Blocks are numbered by their turns here. A front takes in those below it as long as that saves time: dense matrices that
 are a little larger than they need be cost less than many small ones.
 """
 
@@ -16,33 +16,33 @@ from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import compiled
 
 SHARE = 1 / 16
-"""Part of the work that threads take at a time: enough pieces for several threads, and few of them to share out."""
+"""Share of the operations that threads take at a time: enough for several threads, and few of them to share out."""
 FRONT, ADDITION = 1e6, 10.0
 """What a front costs besides its elimination, in floating-point operations: in any case, and for each value that it
 hands to the front above. Two become one where that adds fewer."""
 
 
 class EliminationTree(NamedTuple):
-    """Fronts as sets of parts, the latter numbered by their turns."""
+    """Fronts as sets of blocks, the latter numbered by their turns."""
 
-    parts: Ints
-    """the part of each turn."""
+    blocks: Ints
+    """the block of each turn."""
     begin: Ints
-    """where in `later` those of each part begin."""
+    """where in `later` those of each block begin."""
     later: Ints
-    """the later parts to which each is coupled when its turn comes."""
+    """the later blocks to which each is coupled when its turn comes."""
     tops: Ints
-    """the part that gives each front its border."""
+    """the block that gives each front its border."""
     front: Ints
-    """the front of each part."""
+    """the front of each block."""
     operations: float
     """floating-point operations of a factorisation."""
 
 
-def elimination_tree(graph: sp.csr_array, width: Ints, parts: Ints) -> EliminationTree:
-    """The fronts that make the least work of the parts in this order."""
-    turned = graph[parts][:, parts]
-    n, width = len(parts), width[parts]
+def elimination_tree(graph: sp.csr_array, width: Ints, blocks: Ints) -> EliminationTree:
+    """The fronts that make the least work of the blocks in this order."""
+    turned = graph[blocks][:, blocks]
+    n, width = len(blocks), width[blocks]
     begin = np.zeros(n + 1, dtype=np.int64)
     later = _eliminate(turned.indptr.astype(np.int64), turned.indices.astype(np.int64), begin)
     some = np.diff(begin) > 0
@@ -52,17 +52,17 @@ def elimination_tree(graph: sp.csr_array, width: Ints, parts: Ints) -> Eliminati
     taken, tops = _take_in(above, p, b, FRONT, ADDITION)
     front = np.empty(n, dtype=np.int64)
     front[tops] = np.arange(len(tops))
-    for c in np.flatnonzero(taken != np.arange(n))[::-1]:  # what takes a part in comes after it
+    for c in np.flatnonzero(taken != np.arange(n))[::-1]:  # what takes a block in comes after it
         front[c] = front[taken[c]]
-    return EliminationTree(parts, begin, later, tops, front, float(work(p[tops], b[tops]).sum()))
+    return EliminationTree(blocks, begin, later, tops, front, float(operations_of(p[tops], b[tops]).sum()))
 
 
 @compiled
 def _eliminate(indptr: Any, indices: Any, begin: Any) -> Any:
-    """Eliminate part after part: what is coupled to one comes to be coupled to the next of these."""
+    """Eliminate block after block: what is coupled to one comes to be coupled to the next of these."""
     n = len(indptr) - 1
     later, seen = np.empty(4 * len(indices), np.int64), np.full(n, -1)
-    below, sibling = np.full(n, -1), np.full(n, -1)  # the parts whose next one is this: a linked list
+    below, sibling = np.full(n, -1), np.full(n, -1)  # the blocks whose next one is this: a linked list
     end = 0
     for k in range(n):
         if end + n > len(later):
@@ -89,7 +89,7 @@ def _eliminate(indptr: Any, indices: Any, begin: Any) -> Any:
 
 @compiled
 def _append(head: Any, tail: Any, sibling: Any, k: int, first: int, last: int) -> None:
-    """Append the parts from first to last, a linked list, to that of part k."""
+    """Append the blocks from first to last, a linked list, to that of block k."""
     if head[k] < 0:
         head[k] = first
     else:
@@ -99,9 +99,9 @@ def _append(head: Any, tail: Any, sibling: Any, k: int, first: int, last: int) -
 
 @compiled
 def _take_in(above: Any, p: Any, b: Any, front: float, addition: float) -> Any:
-    """Which part takes each part in, itself where none does, and all those in an order of elimination.
+    """Which block takes each block in, itself where none does, and all those in an order of elimination.
 
-    At first every part is a front of p pivots and b unknowns in its border. Each takes in those below it while that
+    At first every block is a front of p pivots and b unknowns in its border. Each takes in those below it while that
     saves time, the largest first, and its p grows by theirs. Those below a front come just before it, which keeps few
     of them waiting.
     """
@@ -120,8 +120,8 @@ def _take_in(above: Any, p: Any, b: Any, front: float, addition: float) -> Any:
         for m in range(count):
             c = below[m]
             first, last, sibling[c] = c, c, -1
-            apart = work(p[k], b[k]) + work(p[c], b[c]) + front + addition * b[c] ** 2
-            if work(p[k] + p[c], b[k]) < apart:
+            apart = operations_of(p[k], b[k]) + operations_of(p[c], b[c]) + front + addition * b[c] ** 2
+            if operations_of(p[k] + p[c], b[k]) < apart:
                 taken[c], first, last = k, head[c], tail[c]
                 p[k] += p[c]
             if first >= 0:
@@ -143,13 +143,13 @@ def _take_in(above: Any, p: Any, b: Any, front: float, addition: float) -> Any:
 
 
 @compiled
-def work(p: Any, b: Any) -> Any:
+def operations_of(p: Any, b: Any) -> Any:
     """Operations that eliminate p unknowns of p + b: one multiplication and addition for each entry and pivot."""
     return ((p + b) ** 3 - b**3) / 3
 
 
 def subtrees(above: Ints, operations: Floats) -> tuple[range, ...]:
-    """The largest subtrees that hold at most a part `SHARE` of the work each, and single fronts that hold more and have
+    """The largest subtrees that hold at most `SHARE` of the operations each, and single fronts that hold more and have
     none below. Fronts below one another are numbered one after another."""
     total, count = operations.copy(), np.ones(len(above), dtype=np.int64)
     for k in range(len(above)):

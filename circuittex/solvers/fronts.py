@@ -5,8 +5,7 @@ of one sparse matrix. A *front* is a dense symmetric matrix of m unknowns. The f
 eliminated there; what that adds to the others, its *border*, goes to the front *above*, the one that has the
 border's first unknown among its pivots.
 
-Ordering and elimination are followed in *parts* of nodes, the unknowns of which have the same neighbours: part 2 a is
-the position of node a, part 2 a + 1 its directors.
+Ordering and elimination are followed in *blocks* of unknowns that have the same neighbours.
 """
 
 from __future__ import annotations
@@ -15,19 +14,16 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import compiled
 from circuittex.base.frozen import frozen
 from circuittex.solvers.dissection import dissect
-from circuittex.solvers.elimination_tree import EliminationTree, elimination_tree, subtrees, work
-from circuittex.solvers.pattern import DOFS, Pattern, ranges
+from circuittex.solvers.elimination_tree import EliminationTree, elimination_tree, operations_of, subtrees
+from circuittex.solvers.ranges import ranges
 
-POSITION = 3
-"""Unknowns of a node's position; the others are its directors'."""
 WORTHWHILE = 1.2
-"""Parts are dissected anew where their last order takes this times the operations that it took when it was made, since
+"""Blocks are dissected anew where their last order takes this times the operations that it took when it was made, since
 pairs have come to be coupled across its separators."""
 
 
@@ -65,31 +61,54 @@ class Analysis:
     """where in the factor each of the entries belongs."""
     size: int
     """values in the factor."""
-    parts: Ints
-    """the parts by their turns, as dissection gave them."""
+    blocks: Ints
+    """the blocks by their turns, as dissection gave them."""
     least: float
-    """floating-point operations that a factorisation took when the parts were dissected."""
+    """floating-point operations that a factorisation took when the blocks were dissected."""
     subtrees: tuple[range, ...]
     """fronts to eliminate one after another, side by side with those of other ranges; the last is above all others."""
 
 
-def analyse(pattern: Pattern, coupled: NDArray[np.bool_], entries: Ints, last: Analysis | None = None) -> Analysis:
-    """The order of elimination and the fronts of a matrix in which some node pairs are coupled, the others not.
+@frozen
+class Blocks:
+    """Unknowns in n blocks, each of successive unknowns with the same neighbours, and which blocks are coupled."""
 
-    `coupled` tells of each pair of the pattern whether it counts, `entries` are the places of the entries that do
-    (`circuittex.solvers.coupled`). Parts take turns as in the `last` analysis, if there is one, while that serves; else
-    they are dissected anew.
+    graph: sp.csr_array
+    """(n, n) with ones where two different blocks are coupled."""
+    first: Ints
+    """(n,) the first unknown of each."""
+    width: Ints
+    """(n,) how many it has."""
+    position: Floats
+    """(n, 3) where it is, in any unit and by and large: tells where to look for separators."""
+
+
+@frozen
+class Entries:
+    """The entries of a symmetric matrix that are not zero by its structure, in compressed rows."""
+
+    indptr: Ints
+    """(n_dofs + 1,) where rows begin."""
+    indices: Ints
+    """column of each place; of the two places of a pair of unknowns one is used."""
+    used: Ints
+    """the places that count, rising."""
+
+
+def analyse(blocks: Blocks, entries: Entries, last: Analysis | None = None) -> Analysis:
+    """The order of elimination and the fronts of a matrix.
+
+    Blocks take turns as in the `last` analysis, if there is one, while that serves; else they are dissected anew.
     """
-    graph = _graph(pattern, coupled)
-    width = np.tile([POSITION, DOFS - POSITION], graph.shape[0] // 2)
-    tree, least = _ordered(graph, width, pattern.position, last)
-    parts, begin, later, tops, front_of_turn = tree.parts, tree.begin, tree.later, tree.tops, tree.front
+    width = blocks.width
+    tree, least = _ordered(blocks, last)
+    taken, begin, later, tops, front_of_turn = tree.blocks, tree.begin, tree.later, tree.tops, tree.front
 
-    # Parts by their fronts, then their unknowns: the order of elimination.
+    # Blocks by their fronts, then their unknowns: the order of elimination.
     by_front = np.argsort(front_of_turn, kind="stable")
-    parts, turn = parts[by_front], np.argsort(by_front)
-    width = width[parts]
-    order = ranges(DOFS * (parts // 2) + POSITION * (parts % 2), width)
+    taken, turn = taken[by_front], np.argsort(by_front)
+    width = width[taken]
+    order = ranges(blocks.first[taken], width)
     place, front_of = np.argsort(order), np.repeat(front_of_turn[by_front], width)
     p = np.bincount(front_of)
     first = np.cumsum(p) - p
@@ -129,28 +148,27 @@ def analyse(pattern: Pattern, coupled: NDArray[np.bool_], entries: Ints, last: A
         )
         for k in range(len(p))
     )
-    target = np.empty(len(entries), dtype=np.int64)
-    _locate(entries, pattern.indptr, pattern.indices, place, front_of, first, p, cut, border, start, target)
+    target = np.empty(len(entries.used), dtype=np.int64)
+    _locate(entries.used, entries.indptr, entries.indices, place, front_of, first, p, cut, border, start, target)
     return Analysis(
         order=order,
         fronts=fronts,
         target=target,
         size=int(size.sum()),
-        parts=tree.parts,
+        blocks=tree.blocks,
         least=least,
-        subtrees=subtrees(above, work(p.astype(float), b.astype(float))),
+        subtrees=subtrees(above, operations_of(p.astype(float), b.astype(float))),
     )
 
 
-def _ordered(
-    graph: sp.csr_array, width: Ints, position: Floats, last: Analysis | None
-) -> tuple[EliminationTree, float]:
+def _ordered(blocks: Blocks, last: Analysis | None) -> tuple[EliminationTree, float]:
     """The elimination tree in the last order or else a new one, and the operations when that order was made."""
-    if last is not None and len(last.parts) == len(width):
-        tree = elimination_tree(graph, width, last.parts)
+    graph, width = blocks.graph, blocks.width
+    if last is not None and len(last.blocks) == len(width):
+        tree = elimination_tree(graph, width, last.blocks)
         if tree.operations <= WORTHWHILE * last.least:
             return tree, last.least
-    tree = elimination_tree(graph, width, dissect(graph, width, position.repeat(2, axis=0)))
+    tree = elimination_tree(graph, width, dissect(graph, width, blocks.position))
     return tree, tree.operations
 
 
@@ -201,16 +219,3 @@ def _locate(
         p, r = pivots[f], i - first[f]
         wide = cut[f + 1] - cut[f]
         target[k] = start[f] + (r * p + at if at < p else p * p + r * wide + at - p)
-
-
-def _graph(pattern: Pattern, coupled: NDArray[np.bool_]) -> sp.csr_array:
-    """Ones where two different parts are coupled."""
-    n = pattern.n_dofs // DOFS
-    node = np.arange(n)
-    a, b = np.repeat(node, np.diff(pattern.neighbour_start))[coupled], pattern.neighbour[coupled]
-    full = pattern.full_offset[coupled] >= 0
-    c, d = a[full], b[full]
-    i = np.concatenate([2 * node, 2 * a, 2 * c, 2 * c + 1, 2 * c + 1])
-    j = np.concatenate([2 * node + 1, 2 * b, 2 * d + 1, 2 * d, 2 * d + 1])
-    ends = np.concatenate([i, j]), np.concatenate([j, i])
-    return sp.csr_array((np.ones(2 * len(i)), ends), shape=(2 * n, 2 * n))

@@ -20,11 +20,11 @@ from circuittex.design import Design
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.order import reordered
 from circuittex.mech.configuration import Configuration
+from circuittex.mech.linear import LinearSolver
 from circuittex.relaxation.relax import relax
 from circuittex.results.bifurcation import ALLOWED, SETTLED, BranchCheck, difference
 from circuittex.results.outcome import Outcome
 from circuittex.results.records import Record, Study
-from circuittex.solvers.linear import LinearSolver
 from circuittex.study.plan import Step, plan
 from circuittex.study.record import outcome_of, reach
 
@@ -109,5 +109,5 @@ def _settle(
     """
     if tolerance == 0.0:
         raise ConvergenceError("the clamps carry no force that the residual could be measured by")
-    sharp = replace(design, numerics=replace(design.numerics, tolerance=tolerance))
+    sharp = replace(design, numerics=replace(design.numerics, tolerance=f"{tolerance!r} N"))
     return outcome_of(sharp, mesh, relax(mesh, sharp, state, free=step.free, solver=solver))

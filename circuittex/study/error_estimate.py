@@ -16,13 +16,13 @@ from circuittex.design import Design
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration
+from circuittex.mech.linear import LinearSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation.relax import relax
 from circuittex.relaxation.transfer import transfer
 from circuittex.results.discretisation import ErrorEstimate, QuantityError
 from circuittex.results.outcome import Outcome
 from circuittex.results.records import Record, Study
-from circuittex.solvers.linear import LinearSolver
-from circuittex.solvers.multifrontal import MultifrontalSolver
 from circuittex.study.record import outcome_of
 
 VARIANTS = ("half as many elements", "twice as many elements", "twice as many contact points")

@@ -22,8 +22,8 @@ def simplified(design: Design, contacts: ContactState, *, merge_length: float | 
     numerics = design.numerics
     return simplify(
         contacts,
-        merge_length=numerics.merge_length if merge_length is None else merge_length,
-        snap_length=numerics.snap_length,
+        merge_length=design.merge_length if merge_length is None else merge_length,
+        snap_length=design.snap_length,
         drop_fraction=numerics.drop_fraction,
     )
 
@@ -106,7 +106,7 @@ def _header(design: Design, state: str) -> partial[Header]:
 def _simplification(design: Design, simple: Simplified, merge_length: float | None) -> tuple[str, ...]:
     """What was done to the contacts, and how often."""
     numerics = design.numerics
-    length = numerics.merge_length if merge_length is None else merge_length
+    length = design.merge_length if merge_length is None else merge_length
     merged = (
         f"contact points of two fibrils in the same bin of {length!r} mm are one: {simple.merged_contacts} were added "
         "to another"
@@ -114,9 +114,9 @@ def _simplification(design: Design, simple: Simplified, merge_length: float | No
         else "contact points are not merged"
     )
     snapped = (
-        f"feet on a fibril closer than {numerics.snap_length!r} mm share a node: {simple.merged_feet} were moved onto "
+        f"feet on a fibril closer than {design.snap_length!r} mm share a node: {simple.merged_feet} were moved onto "
         "another"
-        if numerics.snap_length
+        if design.snap_length
         else "feet are not snapped"
     )
     dropped = (

@@ -14,11 +14,11 @@ from circuittex.fit import fit_network
 from circuittex.geometry.levels import levels
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
+from circuittex.mech.linear import LinearSolver
 from circuittex.relaxation.increment import Increment, advance
 from circuittex.relaxation.relax import Equilibrium, clamp_force, relax
 from circuittex.results.outcome import Outcome
 from circuittex.results.records import Record, Study
-from circuittex.solvers.linear import LinearSolver
 from circuittex.study.export import detailed_file, simplified
 from circuittex.study.plan import Step
 from circuittex.study.verify import field_convergence, verify

@@ -17,9 +17,9 @@ from circuittex.base.workers import Here, Job, Pool, completed
 from circuittex.design import Design, design_hash
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
+from circuittex.mech.linear import LinearSolver
+from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.results.records import Finding, Record, Study, with_finding
-from circuittex.solvers.linear import LinearSolver
-from circuittex.solvers.multifrontal import MultifrontalSolver
 from circuittex.study.branch_check import branch_checks
 from circuittex.study.error_estimate import estimates, variants
 from circuittex.study.folder import (

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from circuittex.base.errors import CircuittexError, ConvergenceError
 from circuittex.base.workers import Computers
 from circuittex.mech.configuration import Configuration
+from circuittex.mech.linear import LinearSolver
 from circuittex.relaxation.increment import Increment
 from circuittex.results.records import Record, Study
-from circuittex.solvers.linear import LinearSolver
 from circuittex.study.plan import Step, plan
 from circuittex.study.record import reach, record_state
 

@@ -9,17 +9,22 @@ refers to, or the coordinates that three probes have in common, are in the file 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from collections.abc import Mapping, Set
+from dataclasses import MISSING, fields, is_dataclass
 from typing import Any, get_args, get_type_hints
 
 import h5py
 import numpy as np
 
 from circuittex.base.errors import StoreError
+from circuittex.results.store.meaning import meanings, summary, unit
 
 TYPE = "@type"
 """Attribute with the kind of an HDF5 object; no field can have this name."""
+MEANING, UNIT, ATTRIBUTES = "description", "unit", "about"
+"""Attributes for readers of the file: what an object is, its unit, and what the other attributes of a group are."""
+RESERVED = {MEANING, ATTRIBUTES}
+"""Attributes of groups that are no fields."""
 
 _SCALARS = (bool, int, float, str)
 _COMPRESS_ABOVE = 256  # elements; below, chunking costs more than compression saves
@@ -46,10 +51,14 @@ def registry(root: type) -> dict[str, type]:
 
 
 class Digests:
-    """Content digests; remembers the objects it has seen, which must stay alive and unchanged meanwhile."""
+    """Content digests; remembers the objects it has seen, which must stay alive and unchanged meanwhile.
 
-    def __init__(self) -> None:
+    `without` names fields of dataclasses that do not count: those that an older file lacks.
+    """
+
+    def __init__(self, without: Mapping[str, Set[str]] | None = None) -> None:
         self._known: dict[int, tuple[object, str]] = {}
+        self._without = without if without is not None else {}
 
     def __call__(self, value: object) -> str:
         """Digest of arrays, scalars, tuples and dataclasses; equal exactly for equal types and equal bits.
@@ -69,8 +78,10 @@ class Digests:
             result.update("".join(map(self, value)).encode())
         elif is_dataclass(value) and not isinstance(value, type):
             result.update(type(value).__name__.encode())
+            lacking = self._without.get(type(value).__name__, set())
             for field in fields(value):
-                result.update(f"{field.name}={self(getattr(value, field.name))}".encode())
+                if field.name not in lacking:
+                    result.update(f"{field.name}={self(getattr(value, field.name))}".encode())
         elif value is None or type(value) in _SCALARS:
             text = value.hex() if isinstance(value, float) else repr(value)
             result.update(f"{type(value).__name__}{text}".encode())
@@ -81,25 +92,30 @@ class Digests:
 
 
 class Writer:
-    """Writes objects into an open HDF5 file."""
+    """Writes objects into an open HDF5 file, each with what it means and its unit."""
 
     def __init__(self, file: h5py.File) -> None:
         self._shared = file.require_group("objects")
         self.digest = Digests()
 
-    def put(self, parent: h5py.Group, name: str, value: object) -> None:
-        """Write `value` into `parent`: scalars as attributes, everything else as linked objects."""
+    def put(self, parent: h5py.Group, name: str, value: object, meaning: str = "") -> None:
+        """Write `value` into `parent`: scalars as attributes, everything else as linked objects.
+
+        `meaning` is what a reader of the file is told of it. Equal objects of equal meaning are in the file once.
+        """
         if value is None:
             parent.attrs[name] = h5py.Empty("f8")
         elif type(value) in _SCALARS:
             parent.attrs[name] = _scalar(value)
         else:
             key = self.digest(value)
+            if meaning:
+                key += hashlib.blake2b(meaning.encode(), digest_size=4).hexdigest()
             if key not in self._shared:
-                self._create(key, value)
+                self._create(key, value, meaning)
             parent[name] = self._shared[key]
 
-    def _create(self, key: str, value: object) -> None:
+    def _create(self, key: str, value: object, meaning: str) -> None:
         if isinstance(value, (np.ndarray, np.generic)):
             if value.dtype.kind not in "biufc":
                 raise StoreError(f"cannot store an array of {value.dtype}")
@@ -111,16 +127,33 @@ class Writer:
             stored = self._shared.create_dataset(key, data=data, dtype=_dtype(type(value[0])))
             stored.attrs[TYPE] = "tuple"
         elif isinstance(value, tuple):
-            group = self._shared.create_group(key)
-            group.attrs[TYPE] = "tuple"
-            group.attrs["@length"] = len(value)
+            stored = self._shared.create_group(key)
+            stored.attrs[TYPE] = "tuple"
+            stored.attrs["@length"] = len(value)
             for number, item in enumerate(value):
-                self.put(group, f"{number:04d}", item)
+                self.put(stored, f"{number:04d}", item, meaning)
         else:
-            group = self._shared.create_group(key)
-            group.attrs[TYPE] = type(value).__name__
-            for field in fields(value):  # type: ignore[arg-type]
-                self.put(group, field.name, getattr(value, field.name))
+            stored = self._shared.create_group(key)
+            stored.attrs[TYPE] = type(value).__name__
+            self.fields(stored, value)
+        if meaning:
+            stored.attrs[MEANING] = meaning
+            if isinstance(stored, h5py.Dataset):
+                stored.attrs[UNIT] = unit(meaning)
+
+    def fields(self, group: h5py.Group, value: Any) -> None:
+        """Write the fields of a dataclass into a group; what its plain numbers and texts mean is an attribute."""
+        told = meanings(type(value))
+        scalars = []
+        for field in fields(value):
+            content, meaning = getattr(value, field.name), told.get(field.name, "")
+            if is_dataclass(content) and not isinstance(content, type):
+                meaning = summary(type(content))  # the same wherever it stands: one object, shared
+            self.put(group, field.name, content, meaning)
+            if meaning and (content is None or type(content) in _SCALARS):
+                scalars.append(f"{field.name} [{unit(meaning)}]: {meaning}")
+        if scalars:
+            group.attrs[ATTRIBUTES] = "\n".join(scalars)
 
 
 class Reader:
@@ -129,6 +162,8 @@ class Reader:
     def __init__(self, types: Mapping[str, type]) -> None:
         self._types = types
         self._built: dict[int, Any] = {}
+        self.lacking: dict[str, set[str]] = {}
+        """Dataclass -> fields that it has by default here and that the file lacks."""
 
     def get(self, parent: h5py.Group, name: str) -> Any:
         """The value that `Writer.put` stored under `name`."""
@@ -156,10 +191,18 @@ class Reader:
             return tuple(self.get(stored, f"{number:04d}") for number in range(int(stored.attrs["@length"])))
         if kind not in self._types:
             raise StoreError(f"unknown type {kind!r}")
-        names = {field.name for field in fields(self._types[kind])}
-        if names != (set(stored) | set(stored.attrs)) - {TYPE}:
-            raise StoreError(f"the fields of {kind} are not those of this version of circuittex")
-        return self._types[kind](**{name: self.get(stored, name) for name in names})
+        return self.dataclass(stored, self._types[kind])
+
+    def dataclass(self, stored: h5py.Group, kind: type) -> Any:
+        """The dataclass whose fields are in a group; those that an older version did not have take their defaults."""
+        names = {field.name for field in fields(kind)}
+        there = {name for name in (*stored, *stored.attrs) if name not in RESERVED and not name.startswith("@")}
+        optional = {f.name for f in fields(kind) if f.default is not MISSING or f.default_factory is not MISSING}
+        if there - names or names - there - optional:
+            raise StoreError(f"the fields of {kind.__name__} are not those of this version of circuittex")
+        if names - there:
+            self.lacking[kind.__name__] = names - there
+        return kind(**{name: self.get(stored, name) for name in names & there})
 
 
 def _scalar(value: Any) -> Any:

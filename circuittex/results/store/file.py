@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,17 +17,30 @@ from circuittex.design import Design
 from circuittex.results.bifurcation import BranchCheck
 from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.records import FINDINGS, Finding, Record, Study, with_finding
-from circuittex.results.store.archive import Digests, Reader, Writer, registry
+from circuittex.results.store.archive import ATTRIBUTES, MEANING, Digests, Reader, Writer, registry
+from circuittex.results.store.journal import Overlay, changing, commit, finish, overlay
+from circuittex.results.store.meaning import meanings, summary
 
 FORMAT = "circuittex results"
-VERSION = 1
-"""Version of the file layout; files of another layout are refused."""
+VERSION = 2
+"""Version of the file layout. Files of version 1 are read; others are refused."""
+OLDEST = 1
+NAME = "results.h5"
+"""What the file is called in a study's folder."""
 HEAD = ("version", "design", "design_hash", "mesh", "initial")
 """The fields of a `Study` that are known before its first record."""
 NAMES: dict[type[Finding], str] = {ErrorEstimate: "error estimate", BranchCheck: "branch check"}
 """What findings are called where one is damaged."""
 LIBVER = ("v110", "v110")
 """HDF5 1.10: its metadata carry checksums, and every viewer of the last years reads it."""
+GROUPS = {
+    "states": "One group for each recorded state, in the order of the attribute @number: the fields of a Record.",
+    "errors": "Estimated discretisation errors, by the state's name.",
+    "branches": "Whether round-off chose the branch of a state, by its name.",
+    "objects": "Where all of it is stored, each object once, by a digest of its content; every other place links here.",
+}
+TRIES = 20
+"""How often a file is read anew that a run is adding to."""
 
 
 def write_study_start(path: str | Path, study: Study) -> None:
@@ -37,32 +51,44 @@ def write_study_start(path: str | Path, study: Study) -> None:
 
     def fill(file: h5py.File) -> None:
         writer = Writer(file)
-        file.attrs["format"] = FORMAT
-        file.attrs["format_version"] = VERSION
-        head = file.create_group("study")
+        file.attrs.update({"format": FORMAT, "format_version": VERSION, MEANING: summary(Study)})
+        told = meanings(Study)
         for name in HEAD:
-            writer.put(head, name, getattr(study, name))
-        head.attrs["@digest"] = writer.digest(tuple(getattr(study, name) for name in HEAD))
-        file.create_group("records")
+            part = getattr(study, name)
+            writer.put(file, name, part, summary(type(part)) if is_dataclass(part) else told.get(name, ""))
+        file.attrs[ATTRIBUTES] = "\n".join(
+            f"{name}: {told[name]}" for name in ("version", "design_hash") if name in told
+        )
+        file.attrs["@digest"] = writer.digest(tuple(getattr(study, name) for name in HEAD))
+        for name, meaning in GROUPS.items():
+            file.require_group(name).attrs[MEANING] = meaning
         for record in study.records:
-            _add(file, "records", writer, record)
+            _add(file, "states", record.name, writer, record)
         for group in FINDINGS.values():
             for finding in getattr(study, group):
-                _add(file, group, writer, finding)
+                _add(file, group, finding.state, writer, finding)
 
-    _replace(Path(path), "w", fill)
+    path = Path(path)
+    # HDF5 works in memory only: a full disk then meets plain Python I/O, from which one can recover, and not the HDF5
+    # library, which cannot close a file it could not flush.
+    with _as_store_error(path, "cannot be written"):
+        image = Overlay(None, 0)
+        with h5py.File(image, "w", libver=LIBVER) as file:
+            fill(file)
+        finish(path)  # lest a journal of what was there before be taken for one of this
+        with replacing(path) as partial:
+            partial.write_bytes(image.tail)
 
 
 def append_record(path: str | Path, record: Record) -> None:
     """Add one recorded state to the results file at `path`; within its loading path the states come in their order.
 
-    The file is read into memory, extended there, written beside the old one and put in its place in one step, so
-    that at every moment the file at `path` is complete, with or without the new record.
+    What is there is not written again (`circuittex.results.store.journal`), and whenever the process ends, the file is
+    read complete, with or without the new record.
 
-    Errors: `StoreError` where there is no results file at `path`, or it cannot be written.
+    Errors: `StoreError` where there is no results file at `path`, it has the state, or it cannot be written.
     """
-
-    _append(path, "records", record)
+    _append(Path(path), "states", record.name, record)
 
 
 def append_finding(path: str | Path, finding: Finding) -> None:
@@ -70,34 +96,58 @@ def append_finding(path: str | Path, finding: Finding) -> None:
 
     Errors: `StoreError` as there.
     """
-    _append(path, FINDINGS[type(finding)], finding)
+    _append(Path(path), FINDINGS[type(finding)], finding.state, finding)
 
 
 def load_study(path: str | Path) -> Study:
     """Everything that was computed, bit for bit, with locked arrays; checked against the digests in the file.
 
+    `path` is a results file or the folder of a study. A file of an older layout is read, with defaults for what it
+    lacks; while a run adds to the file, what it held a moment ago is read.
+
     Errors: `StoreError` where the file is missing, foreign, damaged, or of a newer layout.
     """
-
-    def read(file: h5py.File) -> Study:
-        _check_layout(file)
-        reader, digest = Reader(registry(Study)), Digests()
-        head = tuple(reader.get(file["study"], name) for name in HEAD)
-        if file["study"].attrs["@digest"] != digest(head):
-            raise StoreError("its content does not match its digest")
-        study = Study(**dict(zip(HEAD, head, strict=True)), records=())
-        records = _in_order(study.design, _members(file["records"], "record", reader, digest))
-        study = replace(study, records=records)
-        for kind, group in FINDINGS.items():
-            for finding in _members(file[group], NAMES[kind], reader, digest) if group in file else ():
-                study = with_finding(study, finding)
-        return study
-
     path = Path(path)
+    path = path / NAME if path.is_dir() else path
     if not path.is_file():
         raise StoreError(f"{path}: there is no results file here")
-    with _as_store_error(path, "cannot be read"), h5py.File(path, "r", locking=False) as file:
-        return read(file)
+    for attempt in range(TRIES):
+        before = changing(path)
+        try:
+            with _as_store_error(path, "cannot be read"):
+                study = _read(path)
+        except StoreError:
+            if changing(path) == before or attempt == TRIES - 1:
+                raise
+            time.sleep(0.01 * attempt)
+            continue
+        return study
+    raise AssertionError("the last try returns or raises")
+
+
+def _read(path: Path) -> Study:
+    with path.open("rb") as handle, h5py.File(overlay(path, handle), "r") as file:
+        version = _check_layout(file)
+        reader = Reader(registry(Study))
+        start = file if version > 1 else file["study"]
+        head = tuple(reader.get(start, name) for name in HEAD)
+        records = _members(file["states" if version > 1 else "records"], reader)
+        findings = {kind: _members(file[group], reader) for kind, group in FINDINGS.items() if group in file}
+        digest = Digests(reader.lacking)
+        if start.attrs["@digest"] != digest(head):
+            raise StoreError("its content does not match its digest")
+        study = Study(**dict(zip(HEAD, head, strict=True)), records=())
+        study = replace(study, records=_in_order(study.design, _checked(records, "record", digest)))
+        for kind, members in findings.items():
+            for finding in _checked(members, NAMES[kind], digest):
+                study = with_finding(study, finding)
+        return replace(study, design=_in_newtons(study.design)) if version == 1 else study
+
+
+def _in_newtons(design: Design) -> Design:
+    """A design of a file of version 1, whose tolerance was a number in N."""
+    numerics = design.numerics
+    return replace(design, numerics=replace(numerics, tolerance=f"{numerics.tolerance!r} N"))
 
 
 def _in_order(design: Design, records: Sequence[Record]) -> tuple[Record, ...]:
@@ -106,56 +156,55 @@ def _in_order(design: Design, records: Sequence[Record]) -> tuple[Record, ...]:
     return tuple(sorted(records, key=lambda record: rank[record.path]))
 
 
-def _append(path: str | Path, group: str, value: Record | Finding) -> None:
-    def fill(file: h5py.File) -> None:
-        _check_layout(file)
-        _add(file, group, Writer(file), value)
+def _append(path: Path, group: str, name: str, value: Record | Finding) -> None:
+    if not path.is_file():
+        raise StoreError(f"{path}: there is no results file here")
+    with _as_store_error(path, "cannot be written"), path.open("rb") as handle:
+        finish(path)
+        changed = overlay(path, handle)
+        with h5py.File(changed, "r+", libver=LIBVER) as file:
+            if (version := _check_layout(file)) != VERSION:
+                raise StoreError(f"its layout is version {version}, to which nothing can be added")
+            if name in file[group]:
+                raise StoreError(f"it holds {group}/{name} already")
+            _add(file, group, name, Writer(file), value)
+        commit(path, changed)
 
-    _replace(Path(path), "r+", fill)
+
+def _add(file: h5py.File, group: str, name: str, writer: Writer, value: Record | Finding) -> None:
+    members = file[group]
+    number = len(members)
+    writer.put(members, name, value, summary(type(value)))
+    members[name].attrs["@number"] = number
+    members[name].attrs["@digest"] = writer.digest(value)
 
 
-def _add(file: h5py.File, group: str, writer: Writer, value: Record | Finding) -> None:
-    members = file.require_group(group)
-    name = _name(len(members))
-    writer.put(members, name, value)
-    members.attrs[f"@digest {name}"] = writer.digest(value)
+def _members(group: h5py.Group, reader: Reader) -> dict[str, tuple[Any, str]]:
+    """Name -> member of a group and its digest, in the order of their numbers."""
+    if "@digest 0000" in group.attrs:  # version 1: the names are the numbers
+        return {name: (reader.get(group, name), str(group.attrs[f"@digest {name}"])) for name in sorted(group)}
+    names = sorted(group, key=lambda name: int(group[name].attrs["@number"]))
+    return {name: (reader.get(group, name), str(group[name].attrs["@digest"])) for name in names}
 
 
-def _members(group: h5py.Group, what: str, reader: Reader, digest: Digests) -> tuple[Any, ...]:
-    """The members of a group in the order of their numbers, each checked against its digest."""
-    names = [_name(number) for number in range(len(group))]
-    members = tuple(reader.get(group, name) for name in names)
-    for name, member in zip(names, members, strict=True):
-        if group.attrs[f"@digest {name}"] != digest(member):
+def _checked(members: Mapping[str, tuple[Any, str]], what: str, digest: Digests) -> list[Any]:
+    for name, (member, stated) in members.items():
+        if digest(member) != stated:
             raise StoreError(f"{what} {name} does not match its digest")
-    return members
+    return [member for member, _ in members.values()]
 
 
-def _name(number: int) -> str:
-    return f"{number:04d}"
-
-
-def _check_layout(file: h5py.File) -> None:
+def _check_layout(file: h5py.File) -> int:
+    """The version of the layout."""
     if file.attrs.get("format") != FORMAT:
         raise StoreError("this is not a results file of circuittex")
-    version = file.attrs["format_version"]
-    if version != VERSION:
-        raise StoreError(f"its layout is version {version}; this circuittex reads version {VERSION}")
-
-
-def _replace(path: Path, mode: str, fill: Callable[[h5py.File], None]) -> None:
-    # HDF5 works in memory only: a full disk then meets plain Python I/O, from which one can recover, and not the HDF5
-    # library, which cannot close a file it could not flush. Nor does it lock: the file that somebody reads is never
-    # changed, only replaced.
-    if mode == "r+" and not path.is_file():
-        raise StoreError(f"{path}: there is no results file here")
-    with _as_store_error(path, "cannot be written"):
-        with h5py.File(path, mode, driver="core", backing_store=False, libver=LIBVER, locking=False) as file:
-            fill(file)
-            file.flush()
-            image = file.id.get_file_image()
-        with replacing(path) as partial:
-            partial.write_bytes(image)
+    version = int(file.attrs["format_version"])
+    if not OLDEST <= version <= VERSION:
+        newer = "a newer circuittex reads it" if version > VERSION else ""
+        raise StoreError(
+            f"its layout is version {version}; this circuittex reads {OLDEST} to {VERSION} {newer}".strip()
+        )
+    return version
 
 
 @contextlib.contextmanager

@@ -14,9 +14,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from circuittex.base.arrays import Floats
-from circuittex.solvers.coupled import Coupled
-from circuittex.solvers.linear import Solve
-from circuittex.solvers.pattern import Pattern
+from circuittex.mech.coupled import Coupled
+from circuittex.mech.linear import Solve
+from circuittex.mech.pattern import Pattern
 
 
 class PardisoSolver:

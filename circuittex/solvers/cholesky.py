@@ -1,4 +1,4 @@
-"""Cholesky's factorisation by dense fronts: the solver that needs no extra.
+"""Cholesky's factorisation of a sparse symmetric matrix by dense fronts.
 
 Each front of `circuittex.solvers.fronts` holds the rows of the factor U, K = U^T U, that belong to its pivots: their
 *triangle* (p, p), and their *border* (p, b). They come as rows of the matrix and of what the fronts below add to it.
@@ -16,57 +16,66 @@ from threading import Lock
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.linalg.blas import dtrsv
 from threadpoolctl import ThreadpoolController
 
 from circuittex.base.arrays import Floats
 from circuittex.base.compiled import compiled, cores
 from circuittex.solvers.blas import cholesky, solve_border, subtract_products
-from circuittex.solvers.coupled import Coupled
-from circuittex.solvers.fronts import Analysis, Front, analyse
-from circuittex.solvers.pattern import Pattern
+from circuittex.solvers.fronts import Analysis, Blocks, Entries, analyse
+from circuittex.solvers.levels import levels
+
+Solve = Callable[[Floats], Floats]
 
 
-class MultifrontalSolver:
-    """Cholesky by dense fronts, which are kept until the pattern changes or node pairs come to be coupled.
+def factorise(matrix: sp.sparray, position: Floats | None = None) -> Solve | None:
+    """A function that solves with a symmetric matrix (n, n), or None if it is not positive definite.
 
-    The pattern has room for all fibrils that may touch. Those that do not have zeros there, which are left out.
+    The upper triangle is read. `position` (n, 3) tells where the unknowns are, for the order of elimination; without it
+    distances in the graph stand for places. See `Cholesky` for matrices that share their structure.
 
-    >>> from circuittex.solvers.pattern import build_pattern, diagonal
-    >>> pattern = build_pattern(2, np.array([[0, 1]]), np.empty((0, 2), dtype=int))
-    >>> twice = np.zeros(pattern.nnz)
-    >>> twice[diagonal(pattern)] = 2.0
-    >>> MultifrontalSolver().factor(pattern, twice)(np.ones(18))[:3].round(15)
-    array([0.5, 0.5, 0.5])
+    >>> chain = sp.diags_array([[-1.0] * 2, [2.0] * 3, [-1.0] * 2], offsets=[-1, 0, 1])
+    >>> factorise(chain)(np.array([1.0, 0.0, 0.0])).round(12)
+    array([0.75, 0.5 , 0.25])
     """
+    upper = sp.triu(matrix, format="csr")
+    upper.sort_indices()
+    n = upper.shape[0]
+    graph = sp.csr_array(upper + upper.T)
+    graph.setdiag(0.0)
+    graph.eliminate_zeros()
+    graph.data[:] = 1.0
+    blocks = Blocks(graph, np.arange(n), np.ones(n, dtype=np.int64), levels(graph) if position is None else position)
+    entries = Entries(upper.indptr.astype(np.int64), upper.indices.astype(np.int64), np.arange(upper.nnz))
+    return Cholesky(analyse(blocks, entries)).factor(upper.data)
 
-    name = "multifrontal"
 
-    def __init__(self) -> None:
+class Cholesky:
+    """Cholesky's factorisation of matrices of one structure, whose `Analysis` tells the fronts."""
+
+    def __init__(self, analysis: Analysis) -> None:
+        self.analysis = analysis
         self._libraries = ThreadpoolController()
-        self._coupled = Coupled()
-        self._analysis: Analysis | None = None
-        self._values: Floats
-        self._blocks: list[tuple[Front, Floats, Floats]]
+        self._values = np.empty(analysis.size)
+        self._dense = [
+            (front, self._view(front.start, p, p), self._view(front.start + p * p, p, len(front.border)))
+            for front in analysis.fronts
+            for p in [front.pivots]
+        ]
         """Each front with the values of its triangle and its border."""
 
-    def factor(self, pattern: Pattern, data: Floats) -> Callable[[Floats], Floats] | None:
-        """A function that solves with the matrix (until the next call), or None if a pivot is not positive."""
-        if self._coupled.renew(pattern, data):
-            self._analysis = analyse(pattern, self._coupled.pairs, self._coupled.entries, self._analysis)
-            self._values = np.empty(self._analysis.size)
-            self._blocks = [
-                (front, self._part(front.start, p, p), self._part(front.start + p * p, p, len(front.border)))
-                for front in self._analysis.fronts
-                for p in [front.pivots]
-            ]
-        assert self._analysis is not None, "no pairs were renewed"
+    def factor(self, values: Floats) -> Solve | None:
+        """A function that solves with the matrix (until the next call), or None if a pivot is not positive.
+
+        `values` are those of the used entries, in their order.
+        """
         self._values[:] = 0.0
-        self._values[self._analysis.target] = data[self._coupled.entries]
+        self._values[self.analysis.target] = values
         with self._libraries.limit(limits=1, user_api="blas"):
             return self._solve if self._eliminate() else None
 
-    def _part(self, start: int, rows: int, columns: int) -> Floats:
+    def _view(self, start: int, rows: int, columns: int) -> Floats:
         return self._values[start : start + rows * columns].reshape(rows, columns)
 
     def _eliminate(self) -> bool:
@@ -74,13 +83,12 @@ class MultifrontalSolver:
 
         Each thread takes subtrees of fronts. Who is the last to finish below a front goes on with that front.
         """
-        assert self._analysis is not None, "factor comes first"
-        subtrees, waiting = deque(self._analysis.subtrees), [len(front.below) for front, _, _ in self._blocks]
+        subtrees, waiting = deque(self.analysis.subtrees), [len(front.below) for front, _, _ in self._dense]
         updates: dict[int, Floats] = {}
         lock = Lock()
         refused: list[int] = []
 
-        def work() -> None:
+        def share() -> None:
             while not refused:
                 try:
                     subtree = subtrees.popleft()
@@ -97,7 +105,7 @@ class MultifrontalSolver:
                 if k + 1 in subtree:
                     k += 1
                     continue
-                k = self._blocks[k][0].above
+                k = self._dense[k][0].above
                 if k < 0:
                     return
                 with lock:
@@ -107,10 +115,10 @@ class MultifrontalSolver:
 
         threads = min(cores(), len(subtrees))
         if threads == 1:
-            work()
+            share()
         else:
             with ThreadPoolExecutor(threads) as pool:
-                for done in [pool.submit(work) for _ in range(threads)]:
+                for done in [pool.submit(share) for _ in range(threads)]:
                     done.result()
         return not refused
 
@@ -119,11 +127,11 @@ class MultifrontalSolver:
 
         What it subtracts from its border joins the updates.
         """
-        front, triangle, border = self._blocks[k]
+        front, triangle, border = self._dense[k]
         update = np.zeros((border.shape[1], border.shape[1]))
         for child in front.below:
-            part = self._blocks[child][0]
-            _add(updates.pop(child), part.places, part.runs, triangle, border, update)
+            under = self._dense[child][0]
+            _add(updates.pop(child), under.places, under.runs, triangle, border, update)
         if not cholesky(triangle):
             return False
         if front.above >= 0:
@@ -134,18 +142,17 @@ class MultifrontalSolver:
 
     def _solve(self, b: Floats) -> Floats:
         """The solution of U^T U x = b: forwards with U^T, backwards with U."""
-        assert self._analysis is not None, "factor comes first"
-        x = b[self._analysis.order]
+        x = b[self.analysis.order]
         with self._libraries.limit(limits=1, user_api="blas"):
-            for front, triangle, border in self._blocks:
+            for front, triangle, border in self._dense:
                 own = x[front.first : front.first + front.pivots]
                 own[:] = dtrsv(triangle.T, own, lower=1)
                 x[front.border] -= own @ border
-            for front, triangle, border in reversed(self._blocks):
+            for front, triangle, border in reversed(self._dense):
                 own = x[front.first : front.first + front.pivots]
                 own[:] = dtrsv(triangle.T, own - border @ x[front.border], lower=1, trans=1)
         solution = np.empty_like(x)
-        solution[self._analysis.order] = x
+        solution[self.analysis.order] = x
         return solution
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from circuittex.base.arrays import Ints
 from circuittex.base.compiled import compiled
-from circuittex.solvers.pattern import Pattern
+from circuittex.mech.pattern import Pattern
 
 
 class Coupled:

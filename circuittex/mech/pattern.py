@@ -89,15 +89,6 @@ def distinct(keys: Ints) -> Ints:
     return rising[np.diff(rising, prepend=-1) > 0]
 
 
-def ranges(first: Ints, length: Ints) -> Ints:
-    """first, first + 1, ... of each range, one range after another.
-
-    >>> ranges(np.array([5, 0]), np.array([2, 3])).tolist()
-    [5, 6, 0, 1, 2]
-    """
-    return np.repeat(first - np.cumsum(length) + length, length) + np.arange(length.sum())
-
-
 def _keys(n: int, pairs: Ints) -> Ints:
     """One number for each pair of different nodes, the lower node first."""
     low, high = np.minimum(pairs[:, 0], pairs[:, 1]), np.maximum(pairs[:, 0], pairs[:, 1])

@@ -2,7 +2,7 @@
 
 A solver's `factor` takes the pattern and the values of a symmetric matrix and returns a function that
 solves with it, or None where a pivot is not positive. The symbolic analysis is kept while the same `Pattern` object
-comes back and its values couple no node pair that was not coupled before (`circuittex.solvers.coupled`).
+comes back and its values couple no node pair that was not coupled before (`circuittex.mech.coupled`).
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from collections.abc import Callable
 from typing import Protocol
 
 from circuittex.base.arrays import Floats
-from circuittex.solvers.pattern import Pattern
+from circuittex.mech.pattern import Pattern
 
 Solve = Callable[[Floats], Floats]
 
 
 class LinearSolver(Protocol):
-    """A direct solver: `circuittex.solvers.multifrontal` is the one by default."""
+    """A direct solver: `circuittex.mech.multifrontal` is the one by default."""
 
     name: str
 

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import json
-import re
 import subprocess
 import sys
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from importlib import import_module
@@ -18,12 +15,10 @@ import pytest
 from synthetic_study import synthetic_study
 
 import circuittex
-from circuittex.base import errors
-from circuittex.base.errors import CircuittexError, CircuittexWarning, ConvergenceError
+from circuittex.base.errors import ConvergenceError
 from circuittex.base.lock import locked
-from circuittex.command.cli import Progress, main
-from circuittex.command.exit_codes import OF_ERRORS, ExitCode, code_of
-from circuittex.command.streams import complain, show_notes
+from circuittex.command.cli import main
+from circuittex.command.exit_codes import ExitCode, code_of
 from circuittex.design import Design, load_design, starter
 from circuittex.electrical.network.circuit import CONTACT, Circuit
 from circuittex.electrical.network.nodal import NodalSolution, solve_nodal
@@ -307,16 +302,6 @@ def test_an_error_of_circuittex_itself_has_a_code_and_a_sentence(
         main(command)
 
 
-def test_every_error_has_a_code_of_its_own_meaning() -> None:
-    """None falls to a code by accident: a new class of error must be given one, or derive from one that has."""
-    kinds = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, CircuittexError)]
-    assert len(kinds) > 5
-    named = tuple(kind for kind, _ in OF_ERRORS)
-    assert [kind for kind in kinds if kind is not CircuittexError and not issubclass(kind, named)] == []
-    for place, (kind, _) in enumerate(OF_ERRORS):
-        assert not issubclass(kind, named[:place]), f"{kind.__name__} never gets its code"
-
-
 def test_what_failed_then_counts_whatever_is_installed_now(
     design_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -328,72 +313,6 @@ def test_what_failed_then_counts_whatever_is_installed_now(
     out = tmp_path / "out"
     assert main(["run", str(design_file), "--out", str(out), "--quiet"]) == ExitCode.SIMULATOR
     assert f"ngspice failed in stretch-0.0250: see the report; 'circuittex verify {out}'" in capsys.readouterr().err
-
-
-# Progress
-
-
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
-
-
-def test_progress_is_one_updating_line_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", "20")
-    stream = Terminal()
-    with Progress(stream) as progress:
-        progress("first")
-        progress("second " * 10)
-    text = stream.getvalue()
-    assert "\n" not in text
-    assert text.split("\r\x1b[2K") == ["", "first", ("second " * 10)[:19], ""]
-
-
-def test_progress_is_plain_lines_elsewhere() -> None:
-    stream = io.StringIO()
-    with Progress(stream) as progress:
-        progress("first")
-        progress("second\n")
-    assert stream.getvalue() == "first\nsecond\n"
-
-
-def test_a_log_gets_a_line_now_and_then_also_of_two_paths_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A hundred iterations a second on each of two paths, for 25 s: a line at the start and one every ten seconds."""
-    now = 0.0
-    monkeypatch.setattr("time.monotonic", lambda: now)
-    stream = io.StringIO()
-    progress = Progress(stream)
-    for iteration in range(2500):
-        now = iteration / 100
-        progress(f"stretch-0.1: iteration {iteration}")
-        progress(f"shear-0.1: iteration {iteration}")
-    lines = stream.getvalue().splitlines()
-    assert lines == [f"{path}-0.1: iteration {i}" for i in (0, 1000, 2000) for path in ("stretch", "shear")]
-
-
-def test_a_note_and_a_complaint_take_the_place_of_the_line_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    stream = Terminal()
-    monkeypatch.setattr("sys.stderr", stream)
-    with warnings.catch_warnings():  # restores how warnings are shown
-        warnings.simplefilter("always")
-        show_notes()
-        with Progress(stream) as progress:
-            progress("relaxed: iteration 1")
-            warnings.warn("no locks", CircuittexWarning, stacklevel=1)
-            progress("relaxed: iteration 2")
-            complain("error", "no\nequilibrium")
-    shown = [re.sub(r".*\r\x1b\[2K", "", line) for line in stream.getvalue().split("\n")[:-1]]
-    assert shown == ["circuittex: note: no locks", "circuittex: error: no equilibrium"]
-
-
-def test_what_ends_with_a_line_break_stays_on_the_terminal() -> None:
-    stream = Terminal()
-    with Progress(stream) as progress:
-        progress("first")
-        progress("3 of 21 states are there already\n")
-        progress("second")
-    start = "\r\x1b[2K"
-    assert stream.getvalue() == f"{start}first{start}3 of 21 states are there already\n{start}second{start}"
 
 
 # netlist, verify, report

@@ -23,7 +23,7 @@ class Clock:
 
 def said(rest: Rest) -> float | None:
     """The estimate, min; None where none is given."""
-    found = re.search(r"the others in about ([\d.]+) (s|min|h)$", rest.words())
+    found = re.search(r"~([\d.]+) (s|min|h) left$", rest.words())
     return float(found[1]) * {"s": 1 / 60, "min": 1.0, "h": 60.0}[found[2]] if found else None
 
 
@@ -91,7 +91,7 @@ def test_it_runs_down_and_ends_where_it_was_wrong() -> None:
     np.testing.assert_allclose(known, 20.0 - np.arange(len(known)), atol=ROUNDED)
     assert len(known) == 20, "a state that takes longer than two should is not known to end soon"
     assert shown[20:] == [None] * 40
-    assert rest.words() == "; 3 of 5 states"
+    assert rest.words() == "; 3/5"
 
 
 def test_nothing_is_known_at_first_nor_said_of_moments() -> None:
@@ -100,11 +100,11 @@ def test_nothing_is_known_at_first_nor_said_of_moments() -> None:
     assert rest.words() == ""
     clock.now = 1000.0
     rest.done("")
-    assert rest.words() == "; 1 of 5 states"
+    assert rest.words() == "; 1/5"
     for _ in range(3):
         clock.now += 0.9 * LEAST
         rest.done("stretch")
-    assert rest.words() == "; 4 of 5 states"
+    assert rest.words() == "; 4/5"
     rest.done("stretch")
     assert rest.words() == ""
 
@@ -121,7 +121,7 @@ def test_states_of_an_earlier_run_say_nothing_about_time() -> None:
     rest("stretch-0.1: iteration 1")
     rest("7 states are there\n")
     assert texts == [
-        "stretch-0.08: iteration 1; 7 of 10 states",
-        "stretch-0.1: iteration 1; 9 of 10 states, the others in about 60 s",
+        "stretch-0.08: iteration 1; 7/10",
+        "stretch-0.1: iteration 1; 9/10, ~60 s left",
         "7 states are there\n",
     ]

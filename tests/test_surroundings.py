@@ -13,12 +13,11 @@ import pytest
 from small_design import NEVER, SMALL
 
 import circuittex
-from circuittex.command.exit_codes import MEANINGS, ExitCode, table
+from circuittex.command.exit_codes import ExitCode
 from circuittex.design import load_design, starter
 
 SECONDS = 300
 """Compilation anew included, on a machine that does other work as well."""
-DOCS = Path(__file__).parent.parent / "docs"
 
 
 def shell(folder: Path, command: str, **environment: str | None) -> subprocess.CompletedProcess[bytes]:
@@ -189,12 +188,3 @@ def test_a_read_only_installation_without_a_home(folder: Path, foreign: bool) ->
     (note,) = lines if not foreign else [line for line in lines if "compiled functions" in line]
     assert note.startswith("circuittex: note: neither the installation nor the home folder can be written to: ")
     assert note.endswith("compiled anew in every process" if foreign else f"kept in {private}")
-
-
-def test_every_exit_code_has_one_meaning_in_help_and_documentation() -> None:
-    assert set(MEANINGS) == set(ExitCode)
-    assert len({*MEANINGS.values()}) == len(MEANINGS)
-    page = (DOCS / "command_line.md").read_text(encoding="utf-8")
-    for code, meaning in MEANINGS.items():
-        assert f"| {code:d} | {meaning} |" in page
-        assert f"{code:>3}  {meaning}" in table()

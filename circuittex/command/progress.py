@@ -31,7 +31,7 @@ class Progress:
             return
         if self._updating and not text.endswith("\n"):
             width = shutil.get_terminal_size().columns - 1
-            self._stream.write(f"{CLEAR}{text[:width]}")
+            self._stream.write(f"{CLEAR}{_fitted(text, width)}")
         elif text.endswith("\n") or self._due(text):
             start = CLEAR if self._updating else ""
             self._stream.write(f"{start}{text.rstrip()}\n")
@@ -51,3 +51,15 @@ class Progress:
         if self._show and self._updating:
             self._stream.write(CLEAR)
             self._stream.flush()
+
+
+def _fitted(text: str, width: int) -> str:
+    """The text on one line: what stands behind its last semicolon is kept, and parts before it go as a whole.
+
+    >>> _fitted("relaxed: iteration 3, largest free force 1.2e-03 N; 2/9", 50)
+    'relaxed: iteration 3; 2/9'
+    """
+    head, mark, end = text.rpartition("; ")
+    while len(head) + len(mark) + len(end) > width and ", " in head:
+        head = head.rpartition(", ")[0]  # a number that is cut would be read as another one
+    return f"{head}{mark}{end}"[:width]

@@ -63,18 +63,18 @@ class Rest:
         self.say(text if text.endswith("\n") else f"{text}{self.words()}")
 
     def words(self) -> str:
-        """What is known of the states, such as '; 3 of 9 states, the others in about 3 min'.
+        """What is known of the states, such as '; 3/9, ~3 min left'; a terminal has little room.
 
         >>> ticks = iter([0.0, 60.0, 70.0, 90.0, 90.0])
         >>> rest = Rest(Counter({"": 1, "stretch": 4}), 5, 1, print, lambda: next(ticks))
         >>> rest.done(""), rest.done("stretch"), rest.done("stretch"), rest.words()
-        (None, None, None, '; 3 of 5 states, the others in about 30 s')
+        (None, None, None, '; 3/5, ~30 s left')
         """
         if not 0 < self.kept < self.total:
             return ""
-        count = f"; {self.kept} of {self.total} states"
+        count = f"; {self.kept}/{self.total}"
         seconds = self._seconds()
-        return f"{count}, the others in about {_length(seconds)}" if seconds >= LEAST else count
+        return f"{count}, ~{_length(seconds)} left" if seconds >= LEAST else count
 
     def _seconds(self) -> float:
         """What the others will take, s; 0 where it cannot be told."""

@@ -96,56 +96,48 @@ def find_contacts(curve: Any, hull: Any, fibrils: Any, points: Floats, rows: Any
 def _find(curve: Any, hull: Any, fibrils: Any, points: Any, rows: Any, found: Any) -> int:
     """Fill `found` as far as it reaches; the number of places there are."""
     scratch = _Scratch(np.empty(3), np.empty((3, 3)), np.empty(4), np.empty((64, 8)))
+    # Taken out of their tuples once: to do so for every point would cost as much as the search.
+    r, x, bulge, tangent, bend, speed = curve.r, scratch.x, hull.bulge, hull.tangent, hull.bend, hull.least_speed
+    interval, other, first, last, turn = rows.interval, rows.fibril, rows.first, rows.last, hull.turn
+    first_interval, first_node, fibril, radius = fibrils.first_interval, fibrils.first_node, fibrils.fibril, fibrils.radius
     count = 0
-    for i in range(rows.interval.shape[0]):
-        a = rows.interval[i]
-        f = fibrils.fibril[a]
-        if f == rows.fibril[i]:
-            ahead, back = hull.turn[rows.last[i] + 1] - hull.turn[a], hull.turn[a + 1] - hull.turn[rows.first[i]]
-            if ahead < QUARTER and back < QUARTER:
-                continue
-        parity = (a - fibrils.first_interval[f]) % points.shape[0]
+    for i in range(interval.shape[0]):
+        a, g = interval[i], other[i]
+        f = fibril[a]
+        own = f == g
+        if own and turn[last[i] + 1] - turn[a] < QUARTER and turn[a + 1] - turn[first[i]] < QUARTER:
+            continue
+        base, node, n, reach = first_interval[g], first_node[g], first_interval[g + 1] - first_interval[g], radius[f] + radius[g]
+        parity = (a - first_interval[f]) % points.shape[0]
         for p in range(points.shape[1]):
             t = points[parity, p]
-            if t >= 0.0:
-                evaluate(curve, a, t, 0, scratch.weight, scratch.x)
-                count = _scan(curve, hull, fibrils, rows, i, p, t, scratch, found, count)
-    return count
-
-
-@compiled
-def _scan(
-    curve: Any, hull: Any, fibrils: Any, rows: Any, i: int, p: int, t: float, scratch: Any, found: Any, count: int
-) -> int:
-    """All places for one contact point, at t on its own interval; returns their number with that of those before."""
-    a, g = rows.interval[i], rows.fibril[i]
-    base, node = fibrils.first_interval[g], fibrils.first_node[g]
-    own = fibrils.fibril[a] == g
-    n = fibrils.first_interval[g + 1] - base
-    meeting = _Meeting(i, p, base, n, fibrils.radius[fibrils.fibril[a]] + fibrils.radius[g])
-    known, slope, far = -1, 0.0, 0.0  # slope and square of the distance at the node `known`
-    for j in range(rows.first[i], rows.last[i] + 1):
-        k = j - base
-        distance, start = _chord(curve.r, scratch.x, node + k)
-        if distance - hull.bulge[j] >= meeting.reach:
-            continue
-        if known != k:
-            slope, far = _at_node(curve.r, hull.tangent, scratch.x, node + k)
-        next_slope, next_far = _at_node(curve.r, hull.tangent, scratch.x, node + k + 1)
-        if k == 0 and not _negative(slope):
-            count = _record(curve, meeting, 0.0, 1.0, scratch, found, count)
-        rises = (np.sqrt(max(far, next_far)) + hull.bulge[j]) * hull.bend[j] < hull.least_speed[j] ** 2
-        if own or not rises:
-            itself = t if own and j == a else -1.0
-            _coefficients(hull.points[j], scratch.x, scratch.pieces[0])
-            scratch.pieces[0, 0], scratch.pieces[0, 5] = slope, next_slope
-            count = _isolate(curve, meeting, k, itself, scratch, found, count)
-        elif _negative(slope) and not _negative(next_slope):
-            s = _root(curve, meeting, k + start, float(k), k + 1.0, 1.0, scratch)
-            count = _record(curve, meeting, s, 1.0, scratch, found, count)
-        if k == n - 1 and _negative(next_slope):
-            count = _record(curve, meeting, float(n), 1.0, scratch, found, count)
-        known, slope, far = k + 1, next_slope, next_far
+            if t < 0.0:
+                continue
+            evaluate(curve.basis[curve.kind[a]], r, curve.window[a], t, 0, scratch.weight, x)
+            meeting = _Meeting(i, p, base, n, reach)
+            known, slope, far = -1, 0.0, 0.0  # slope and square of the distance at the node `known`
+            for j in range(first[i], last[i] + 1):
+                k = j - base
+                distance, start = _chord(r, x, node + k)
+                if distance - bulge[j] >= reach:
+                    continue
+                if known != k:
+                    slope, far = _at_node(r, tangent, x, node + k)
+                next_slope, next_far = _at_node(r, tangent, x, node + k + 1)
+                if k == 0 and not _negative(slope):
+                    count = _record(curve, meeting, 0.0, 1.0, scratch, found, count)
+                rises = (np.sqrt(max(far, next_far)) + bulge[j]) * bend[j] < speed[j] ** 2
+                if own or not rises:
+                    itself = t if own and j == a else -1.0
+                    _coefficients(hull.points[j], x, scratch.pieces[0])
+                    scratch.pieces[0, 0], scratch.pieces[0, 5] = slope, next_slope
+                    count = _isolate(curve, meeting, k, itself, scratch, found, count)
+                elif _negative(slope) and not _negative(next_slope):
+                    s = _root(curve, meeting, k + start, float(k), k + 1.0, 1.0, scratch)
+                    count = _record(curve, meeting, s, 1.0, scratch, found, count)
+                if k == n - 1 and _negative(next_slope):
+                    count = _record(curve, meeting, float(n), 1.0, scratch, found, count)
+                known, slope, far = k + 1, next_slope, next_far
     return count
 
 
@@ -185,7 +177,8 @@ def _record(curve: Any, meeting: Any, s: float, sign: float, scratch: Any, found
     """Keep the place s if it is within reach."""
     k = min(meeting.n - 1, int(s))
     x, y = scratch.x, scratch.work[0]
-    evaluate(curve, meeting.base + k, s - k, 0, scratch.weight, y)
+    interval = meeting.base + k
+    evaluate(curve.basis[curve.kind[interval]], curve.r, curve.window[interval], s - k, 0, scratch.weight, y)
     overlap = meeting.reach - np.sqrt((x[0] - y[0]) ** 2 + (x[1] - y[1]) ** 2 + (x[2] - y[2]) ** 2)
     if overlap <= 0.0:
         return count
@@ -201,10 +194,11 @@ def _root(curve: Any, meeting: Any, s: float, low: float, high: float, sign: flo
 
     Bisection keeps it between its bounds.
     """
-    x, work, k, close = scratch.x, scratch.work, int(low), 1e-14 * meeting.n
+    x, work, weight, r, k, close = scratch.x, scratch.work, scratch.weight, curve.r, int(low), 1e-14 * meeting.n
+    basis, window = curve.basis[curve.kind[meeting.base + k]], curve.window[meeting.base + k]
     for _ in range(MAX_STEPS):
         for order in range(3):
-            evaluate(curve, meeting.base + k, s - k, order, scratch.weight, work[order])
+            evaluate(basis, r, window, s - k, order, weight, work[order])
         slope, bend = 0.0, 0.0
         for c in range(3):
             slope -= (x[c] - work[0, c]) * work[1, c]

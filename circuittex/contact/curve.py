@@ -94,12 +94,8 @@ def weights(basis: Any, t: float, order: int, c: Any) -> None:
 
 
 @compiled
-def evaluate(curve: Any, interval: int, t: float, order: int, c: Any, x: Any) -> None:
-    """Fill x (3,) with an interval's point at t, or its derivative of the given order with respect to t.
-
-    c (4,) receives the weights of the window's nodes.
-    """
-    r, first = curve.r, curve.window[interval]
-    weights(curve.basis[curve.kind[interval]], t, order, c)
+def evaluate(basis: Any, r: Any, window: int, t: float, order: int, c: Any, x: Any) -> None:
+    """Fill x (3,) with the curve, or its derivative of the given order with respect to t; c (4,) with the weights."""
+    weights(basis, t, order, c)
     for k in range(3):
-        x[k] = c[0] * r[first, k] + c[1] * r[first + 1, k] + c[2] * r[first + 2, k] + c[3] * r[first + 3, k]
+        x[k] = c[0] * r[window, k] + c[1] * r[window + 1, k] + c[2] * r[window + 2, k] + c[3] * r[window + 3, k]

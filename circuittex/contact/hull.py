@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from circuittex.base.arrays import Floats
-from circuittex.contact.curve import CurveTable, bezier
+from circuittex.base.compiled import compiled
+from circuittex.contact.curve import Curve
 
 QUARTER = np.pi / 2
 """Of a turn: as long as a fibril turns by less, the distance from any of its points grows along it."""
@@ -19,7 +20,7 @@ class Hull(NamedTuple):
     points: Floats
     """(I, 4, 3) Bézier points, mm."""
     tangent: Floats
-    """(N, 3) derivative of the centre line by position in nodes at each node, mm."""
+    """(N, 3) derivative of the centre line by the position in nodes, at each node, mm."""
     bulge: Floats
     """(I,) how far the interval strays from its chord at most, mm."""
     least_speed: Floats
@@ -30,40 +31,70 @@ class Hull(NamedTuple):
     """(I + 1,) running sum of the angles by which the tangent turns in each interval at most, rad."""
 
 
-def hulls(table: CurveTable, r: Floats) -> Hull:
-    """The bounds for centre lines through nodes r (N, 3)."""
-    points = bezier(table, r)
-    chord = points[:, 3] - points[:, 0]
-    thirds = points[:, :1] + np.array([[1.0], [2.0]]) / 3 * chord[:, None]
-    derivative = 3 * np.diff(points, axis=1)
-    tangent = np.empty_like(r)
-    start = np.arange(len(points)) + table.fibril  # a fibril has one node more than intervals
-    tangent[start + 1] = derivative[:, 2]  # of a fibril's last node; of the others the next interval's is the same
-    tangent[start] = derivative[:, 0]
-    along = (derivative * chord[:, None]).sum(axis=2).min(axis=1)
-    length = np.sqrt((chord**2).sum(axis=1))
-    second = 2 * np.diff(derivative, axis=1)
-    return Hull(
-        points=points,
-        tangent=tangent,
-        bulge=0.75 * np.sqrt(((points[:, 1:3] - thirds) ** 2).sum(axis=2)).max(axis=1),
-        least_speed=np.divide(along, length, out=np.zeros_like(length), where=along > 0.0),
-        bend=np.sqrt((second**2).sum(axis=2)).max(axis=1),
-        turn=_turning(derivative),
+def hulls(curve: Curve) -> Hull:
+    """The bounds for the centre lines of a configuration."""
+    n = len(curve.window)
+    hull = Hull(
+        points=np.empty((n, 4, 3)),
+        tangent=np.empty_like(curve.r),
+        bulge=np.empty(n),
+        least_speed=np.empty(n),
+        bend=np.empty(n),
+        turn=np.zeros(n + 1),
     )
+    _bound(curve, hull)
+    return hull
 
 
-def turning(table: CurveTable, r: Floats) -> Floats:
-    """`Hull.turn` alone."""
-    return _turning(np.diff(bezier(table, r), axis=1))
+@compiled
+def _bound(curve: Any, hull: Any) -> None:
+    """Fill the bounds.
 
-
-def _turning(derivative: Floats) -> Floats:
-    """(I + 1,) running sum of the angles between the Bézier points (I, 3, 3) of the derivative.
-
-    Within an interval the tangent is a positive combination of these three, so it turns by no more.
+    The derivative of an interval is a positive combination of its three Bézier points: so its part along the chord is
+    at least the smallest of theirs, and its direction turns by no more than the angles between them.
     """
-    a, b = derivative[:, :2], derivative[:, 1:]
-    sine = np.sqrt((np.cross(a, b) ** 2).sum(axis=2))
-    angle = np.arctan2(sine, (a * b).sum(axis=2)).sum(axis=1)
-    return np.concatenate([[0.0], np.cumsum(angle)])
+    power, slope = np.empty((4, 3)), np.empty((3, 3))
+    for i in range(curve.window.shape[0]):
+        basis, first, points = curve.basis[curve.kind[i]], curve.window[i], hull.points[i]
+        for m in range(4):
+            for c in range(3):
+                power[m, c] = 0.0
+                for a in range(4):
+                    power[m, c] += basis[a, m] * curve.r[first + a, c]
+        bulge, bend = np.zeros(2), np.zeros(2)
+        for c in range(3):
+            points[0, c] = power[0, c]
+            points[1, c] = power[0, c] + power[1, c] / 3
+            points[2, c] = power[0, c] + 2 * power[1, c] / 3 + power[2, c] / 3
+            points[3, c] = power[0, c] + power[1, c] + power[2, c] + power[3, c]
+            chord = points[3, c] - points[0, c]
+            for m in range(3):
+                slope[m, c] = 3 * (points[m + 1, c] - points[m, c])
+            for m in range(2):
+                bulge[m] += (points[m + 1, c] - points[0, c] - (m + 1) / 3 * chord) ** 2
+                bend[m] += 4 * (slope[m + 1, c] - slope[m, c]) ** 2
+        hull.bulge[i], hull.bend[i] = 0.75 * np.sqrt(bulge.max()), np.sqrt(bend.max())
+        _direct(points, slope, i, hull)
+        node = first + (0, 1, 2)[curve.kind[i]]
+        hull.tangent[node], hull.tangent[node + 1] = slope[0], slope[2]  # the same as the next interval's first
+
+
+@compiled
+def _direct(points: Any, slope: Any, i: int, hull: Any) -> None:
+    """The bounds of interval i that depend on directions, from its Bézier points and those of its derivative (3, 3)."""
+    length, along = 0.0, np.zeros(3)
+    for c in range(3):
+        chord = points[3, c] - points[0, c]
+        length += chord * chord
+        for m in range(3):
+            along[m] += slope[m, c] * chord
+    hull.least_speed[i] = max(0.0, along.min() / np.sqrt(length)) if length > 0.0 else 0.0
+    angle = 0.0
+    for m in range(2):
+        dot, cross = 0.0, 0.0
+        for c in range(3):
+            d, e = (c + 1) % 3, (c + 2) % 3
+            dot += slope[m, c] * slope[m + 1, c]
+            cross += (slope[m, d] * slope[m + 1, e] - slope[m, e] * slope[m + 1, d]) ** 2
+        angle += np.arctan2(np.sqrt(cross), dot)
+    hull.turn[i + 1] = hull.turn[i] + angle

@@ -12,7 +12,7 @@ from circuittex.base.compiled import cores, side_by_side
 from circuittex.base.frozen import frozen
 from circuittex.contact.closest import Fibrils, Found, find_contacts
 from circuittex.contact.curve import CurveTable, curve_table, curve_through
-from circuittex.contact.hull import QUARTER, hulls, turning
+from circuittex.contact.hull import QUARTER, hulls
 from circuittex.contact.kernels import Rows, Sums, Touches, add_contacts
 from circuittex.contact.law import pair_penalty
 from circuittex.contact.search import CONTROL_MOTION, Candidates, bent_back, coupled_nodes, find_candidates
@@ -98,7 +98,7 @@ class PenaltyContact:
         """Renew the candidates once a Bézier point may have moved by half the skin, or a fibril bends back on itself."""
         r = self.positions(q)
         held = self._near(r)
-        turn = turning(self.table, r)
+        turn = hulls(curve_through(self.table, r)).turn
         renewed = held is not self._held or bool(np.any(bent_back(self.table, held[0], turn, QUARTER) & ~self._own))
         if renewed:
             self._held, self._own = held, bent_back(self.table, held[0], turn, LIKELY)
@@ -136,7 +136,8 @@ class PenaltyContact:
     def _search(self, candidates: Candidates, r: Floats) -> Touching:
         """The places of all candidates, in pieces on all cores; the result does not depend on their number."""
         table, points = self.table, self.points
-        curve, hull = curve_through(table, r), hulls(table, r)
+        curve = curve_through(table, r)
+        hull = hulls(curve)
         edges = np.linspace(0, len(candidates.interval), CHUNKS + 1).astype(int)
 
         def piece(first: int, last: int) -> Found:

@@ -128,7 +128,7 @@ def _find(curve: Any, hull: Any, fibrils: Any, points: Any, rows: Any, found: An
                     count = _record(curve, meeting, 0.0, 1.0, scratch, found, count)
                 rises = (np.sqrt(max(far, next_far)) + bulge[j]) * bend[j] < speed[j] ** 2
                 if own or not rises:
-                    itself = t if own and j == a else -1.0
+                    itself = t + a - j if own else -1.0
                     _coefficients(hull.points[j], x, scratch.pieces[0])
                     scratch.pieces[0, 0], scratch.pieces[0, 5] = slope, next_slope
                     count = _isolate(curve, meeting, k, itself, scratch, found, count)
@@ -222,15 +222,19 @@ def _root(curve: Any, meeting: Any, s: float, low: float, high: float, sign: flo
 def _isolate(curve: Any, meeting: Any, k: int, itself: float, scratch: Any, found: Any, count: int) -> int:
     """All places on interval k of a fibril on which phi' may fall, in their order.
 
-    The first of the scratch's pieces holds its Bernstein coefficients. `itself`: where on the interval the contact point
-    itself lies, -1 elsewhere; that is not one of the places.
+    The first of the scratch's pieces holds its Bernstein coefficients. `itself`: where the contact point itself lies,
+    outside of 0 to 1 if elsewhere; that is not one of the places.
     """
     pieces = scratch.pieces
     pieces[0, 6], pieces[0, 7] = 0.0, 1.0
     top = 0
-    if itself >= 0.0:
+    # Before the point itself the distance falls, behind it it rises.
+    if itself == 0.0:
+        pieces[0, 0] = 0.0
+    elif itself == 1.0:
+        pieces[0, 5] = -0.0
+    elif 0.0 < itself < 1.0:
         _split(pieces[0], pieces[1], itself)
-        # Before the point itself the distance falls, behind it it rises.
         pieces[0, 0], pieces[1, 5] = 0.0, -0.0
         top = 1
     while top >= 0:

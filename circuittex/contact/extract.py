@@ -43,7 +43,7 @@ def contact_state(
     space = beam_space(mesh)
     term = PenaltyContact(mesh, law=law, per_element=per_element)
     found, table = term.touching(space.vector(configuration)), term.table
-    part = shares(found)
+    part = shares(found, table)
     touching, part = _take(found, part > 0.0), part[part > 0.0]
     a, b = table.fibril[touching.interval_a], touching.fibril_b
     spacing = mesh.length / (np.diff(mesh.first_node) - 1)

@@ -147,7 +147,7 @@ def test_contacts_far_apart_on_one_fibril_stay_two(apart: float, left: int) -> N
 
 
 def test_a_bridge_is_not_shorted_by_merging() -> None:
-    """0.2 and 0.4 mm of a fibril in series with 3.4 mm beside a bridge of 0.2 mm and two contacts: by hand 2.39698 ohm."""
+    """0.2 and 0.4 mm of a fibril in series with 3.4 mm beside 0.2 mm of another and two contacts: 2.39698 ohm."""
     design = ct.plain_weave("paper-code", yarns=2, rows=(1,))
     mesh = ct.build_mesh(design)
     one = np.ones(2)

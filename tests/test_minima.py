@@ -45,10 +45,9 @@ def stationary(x: Floats, mesh: FibrilMesh, fibril: int) -> list[tuple[float, fl
     for k in range(n):
         piece = [Polynomial(curve.c[::-1, k, c]) for c in range(3)]
         slope = sum(((y - xc) * y.deriv() for y, xc in zip(piece, x, strict=True)), Polynomial([0.0]))
-        for root in slope.roots():
-            # A double root is no place; a simple one has an imaginary part of round-off at the most.
-            if abs(root.imag) < 1e-9 and 0.0 <= root.real < 1.0:
-                places.append((k + root.real, np.sign(slope.deriv()(root.real))))
+        # A double root is no place; a simple one has an imaginary part of round-off at the most.
+        roots = [root.real for root in slope.roots() if abs(root.imag) < 1e-9 and 0.0 <= root.real < 1.0]
+        places += [(k + root, np.sign(slope.deriv()(root))) for root in roots]
     start, stop = ((curve(s) - x) @ curve(s, 1) for s in (0.0, float(n)))
     places += [(0.0, 1.0)] * bool(start > 0) + [(float(n), 1.0)] * bool(stop < 0)
     return [(s, float(np.linalg.norm(curve(s) - x)), sign) for s, sign in sorted(places)]
@@ -161,7 +160,9 @@ def with_hairpin(line: Floats, other: Floats) -> FibrilMesh:
     """A hairpin whose natural length is that of as many intervals as it has, and another fibril."""
     intervals = len(line) - 1
     return fibrils_through(
-        [line, other], radius=R, length=[intervals * np.linalg.norm(line[1] - line[0]), np.linalg.norm(other[-1] - other[0])]
+        [line, other],
+        radius=R,
+        length=[intervals * np.linalg.norm(line[1] - line[0]), np.linalg.norm(other[-1] - other[0])],
     )
 
 
@@ -215,10 +216,10 @@ def test_the_turns_of_a_coil_touch() -> None:
     inside = (found.position_b > 0) & (found.position_b < 3 * n)
     assert np.all(found.sign == 1.0)
     assert set(np.unique(at, return_counts=True)[1].tolist()) == {1, 2}
-    # A point has a turn above it unless that is beyond the end, and a turn below it likewise; two points an interval.
+    # A point has a turn above it unless that is beyond the end, and one below likewise; two points an interval.
     whole_turn = n * nearest.x / (2 * np.pi)
     assert np.count_nonzero(inside) == pytest.approx(2 * 2 * (3 * n - whole_turn), abs=2 * 2)
-    # Tangents too short by h^2/6 bring a chord's middle a h^4/48 nearer to the axis; away from the parabolas at the ends.
+    # Tangents too short by h^2/6 bring a chord's middle a h^4/48 nearer to the axis; the ends are parabolas.
     inner = (np.minimum(at, found.position_b) > 2) & (np.maximum(at, found.position_b) < 3 * n - 2)
     error = np.abs(2 * R - found.overlap[inner] - np.sqrt(nearest.fun)).max()
     assert error < 2 * radius * (2 * np.pi / n) ** 4 / 48
@@ -274,7 +275,9 @@ def changes() -> list[float]:
     found = []
     for (a, before), (b, after) in pairwise(zip(grid.tolist(), known, strict=True)):
         if before != after:
-            found.append(brentq(lambda x, before=before: 1.0 if pattern_of_signs(x) == before else -1.0, a, b, xtol=1e-12))
+            found.append(
+                brentq(lambda x, before=before: 1.0 if pattern_of_signs(x) == before else -1.0, a, b, xtol=1e-12)
+            )
     return found
 
 
@@ -299,10 +302,8 @@ def test_some_of_these_changes_are_inside_the_reach() -> None:
     """Pairs of a minimum and a maximum that appear with an overlap of 0.05 mm or more: what would be a jump of energy."""
     inside = 0
     for x in changes():
-        (few, a), (many, b) = sorted(
-            ((term.touching(q), s) for s in (-1e-9, 1e-9) for term, q in [through_the_bend(x + s)]),
-            key=lambda pair: len(pair[0].sign),
-        )
+        here = [term.touching(q) for term, q in map(through_the_bend, (x - 1e-9, x + 1e-9))]
+        few, many = sorted(here, key=lambda found: len(found.sign))
         new = set(many.overlap.round(6).tolist()) - set(few.overlap.round(6).tolist())
         inside += len(many.sign) - len(few.sign) == 2 and bool(new) and min(new) > 0.05
     assert inside >= 3

@@ -83,12 +83,12 @@ def find_contacts(curve: Any, hull: Any, fibrils: Any, points: Floats, rows: Any
     `Candidates`; `room` is the number of places expected: where there are more, they are found anew.
     """
     while True:
-        whole = (np.empty(room, dtype=np.int64) for _ in range(2))
-        real = (np.empty(room) for _ in range(3))
-        found = Found(*whole, *real)
+        row, point = np.empty((2, room), dtype=np.int64)
+        position, overlap, sign = np.empty((3, room))
+        found = Found(row, point, position, overlap, sign)
         count = int(_find(curve, hull, fibrils, points, rows, found))
         if count <= room:
-            return Found(*(column[:count] for column in found))
+            return Found(row[:count], point[:count], position[:count], overlap[:count], sign[:count])
         room = count
 
 
@@ -99,7 +99,12 @@ def _find(curve: Any, hull: Any, fibrils: Any, points: Any, rows: Any, found: An
     # Taken out of their tuples once: to do so for every point would cost as much as the search.
     r, x, bulge, tangent, bend, speed = curve.r, scratch.x, hull.bulge, hull.tangent, hull.bend, hull.least_speed
     interval, other, first, last, turn = rows.interval, rows.fibril, rows.first, rows.last, hull.turn
-    first_interval, first_node, fibril, radius = fibrils.first_interval, fibrils.first_node, fibrils.fibril, fibrils.radius
+    first_interval, first_node, fibril, radius = (
+        fibrils.first_interval,
+        fibrils.first_node,
+        fibrils.fibril,
+        fibrils.radius,
+    )
     count = 0
     for i in range(interval.shape[0]):
         a, g = interval[i], other[i]
@@ -107,7 +112,12 @@ def _find(curve: Any, hull: Any, fibrils: Any, points: Any, rows: Any, found: An
         own = f == g
         if own and turn[last[i] + 1] - turn[a] < QUARTER and turn[a + 1] - turn[first[i]] < QUARTER:
             continue
-        base, node, n, reach = first_interval[g], first_node[g], first_interval[g + 1] - first_interval[g], radius[f] + radius[g]
+        base, node, n, reach = (
+            first_interval[g],
+            first_node[g],
+            first_interval[g + 1] - first_interval[g],
+            radius[f] + radius[g],
+        )
         parity = (a - first_interval[f]) % points.shape[0]
         for p in range(points.shape[1]):
             t = points[parity, p]

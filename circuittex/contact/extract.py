@@ -36,9 +36,9 @@ def contact_state(
     """The contact points of a configuration with their loads, Hertz half-widths and conductances.
 
     p = P* o [28], a = sqrt(4 R* p / (pi E*)) [29], G = sigma_c a w [31] (0 where either fibril insulates),
-    heat conductance h_c a w [30]. A contact point has a row for each minimum of the distance, with its part of the weight
-    (`share`). `per_element` contact points an element; `conduction` is 'reference' or
-    'current' (`axial_factor`).
+    heat conductance h_c a w [30]. A contact point has a row for each minimum of the distance, with its part of
+    the weight (`share`). `per_element` contact points an element; `conduction` is 'reference' or 'current'
+    (`axial_factor`).
     """
     space = beam_space(mesh)
     term = PenaltyContact(mesh, law=law, per_element=per_element)

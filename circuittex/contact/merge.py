@@ -44,11 +44,11 @@ def simplify(state: ContactState, *, merge_length: float, snap_length: float, dr
 def merge_contacts(state: ContactState, length: float) -> ContactState:
     """One contact for all those of a fibril pair that lie together on both fibrils.
 
-    Along the lower-numbered fibril, which becomes fibril a, together is what falls into the same bin of `length` mm. Of
-    these, neighbours along the other are merged, whose bins are a quarter as long. A run of bins that hold contacts ends
-    where four are empty; one of up to six bins becomes one contact, and each bin of a longer one makes its own. So what
-    spans up to 5/4 `length` along the other fibril and lies alone is merged, and what spans more than 3/2 never is. Both
-    sides of the pair are taken in.
+    Along the lower-numbered fibril, which becomes fibril a, together is what falls into the same bin of `length` mm.
+    Of these, neighbours along the other are merged, whose bins are a quarter as long. A run of bins that hold
+    contacts ends where four are empty; one of up to six bins becomes one contact, and each bin of a longer one makes
+    its own. So what spans up to 5/4 `length` along the other fibril and lies alone is merged, and what spans more
+    than 3/2 never is. Both sides of the pair are taken in.
 
     Sums are kept: conductances and weights, and weighted by them contact area (width), force (line load) and
     gap; so G = sigma_c a w [31] still holds. The feet are means weighted by contact area. The result is
@@ -95,7 +95,6 @@ def _together(state: ContactState, length: float) -> tuple[Ints, Ints]:
     group = np.empty(len(order), dtype=np.int64)
     group[order] = np.cumsum(own) - 1
     return group, np.flatnonzero(own)
-
 
 
 def snap_feet(state: ContactState, length: float) -> tuple[ContactState, int]:

@@ -95,7 +95,7 @@ class PenaltyContact:
         return np.ascontiguousarray(q.reshape(-1, 9)[:, :3])
 
     def prepare(self, q: Floats) -> bool:
-        """Renew the candidates once a Bézier point may have moved by half the skin, or a fibril bends back on itself."""
+        """Renew the candidates once a Bézier point may have moved by half the skin, or a fibril bends back anew."""
         r = self.positions(q)
         held = self._near(r)
         turn = hulls(curve_through(self.table, r)).turn
@@ -193,4 +193,3 @@ class PenaltyContact:
         work = np.cumsum(3 * np.bincount(low, minlength=n) + np.bincount(high, minlength=n))
         inner = np.searchsorted(work, work[-1] * np.arange(1, pieces) / pieces) + 1
         return [0, *np.minimum(inner, n).tolist(), n]
-

@@ -55,7 +55,9 @@ def find_candidates(table: CurveTable, r: Floats, radius: Floats, skin: float) -
     order = np.lexsort((j, i))
     i, j = i[order], j[order]
     fibril = table.fibril[j]
-    start = np.flatnonzero((np.diff(i, prepend=-1) != 0) | (np.diff(j, prepend=-2) != 1) | (np.diff(fibril, prepend=0) != 0))
+    start = np.flatnonzero(
+        (np.diff(i, prepend=-1) != 0) | (np.diff(j, prepend=-2) != 1) | (np.diff(fibril, prepend=0) != 0)
+    )
     end = np.append(start[1:], len(i)) - 1
     return Candidates(interval=i[start], fibril=fibril[start], first=j[start], last=j[end])
 

@@ -299,7 +299,7 @@ def test_energy_and_forces_are_continuous_where_minima_appear_and_vanish() -> No
 
 
 def test_some_of_these_changes_are_inside_the_reach() -> None:
-    """Pairs of a minimum and a maximum that appear with an overlap of 0.05 mm or more: what would be a jump of energy."""
+    """Pairs of a minimum and a maximum that appear with an overlap of 0.05 mm or more: it would be a jump of energy."""
     inside = 0
     for x in changes():
         here = [term.touching(q) for term, q in map(through_the_bend, (x - 1e-9, x + 1e-9))]

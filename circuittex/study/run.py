@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -107,14 +108,14 @@ def _in_folder(
     jobs: Callable[[Study], Sequence[Job]],
 ) -> Study:
     """Complete the study and everything in its folder."""
-    total, kept = len(plan(study.design)), len(study.records)
-    if kept:
-        say(f"{kept} of {total} states are there already\n")
-    rest = Rest(total, kept, say)
+    path, known = {step.name: step.path for step in plan(study.design)}, {record.name for record in study.records}
+    if known:
+        say(f"{len(known)} of {len(path)} states are there already\n")
+    rest = Rest(Counter(path[name] for name in path if name not in known), len(path), workers, say)
 
     def keep(so_far: Study, record: Record) -> Study:
         so_far = keep_record(folder, so_far, record)
-        rest.done()
+        rest.done(path[record.name])
         write_state(folder, so_far, record)
         write_numbers(folder, so_far)
         return so_far
@@ -127,7 +128,7 @@ def _in_folder(
         complete(folder, study)
     except (OSError, StoreError) as error:
         raise StoreError(
-            f"{error}; {rest.kept} of {total} states are kept in {folder}, and the same call goes on from there"
+            f"{error}; {rest.kept} of {rest.total} states are kept in {folder}, and the same call goes on from there"
         ) from error
     return study
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from circuittex.base.arrays import Floats
+from circuittex.base.frozen import same
 from circuittex.contact.extract import contacts_of
 from circuittex.design import HERTZ, ContactLaw, Design, Material, Numerics, Weave, Yarn, plain_weave
 from circuittex.electrical.fields import solve_probes
@@ -75,7 +76,7 @@ def test_a_scale_changes_nothing() -> None:
     """Lengths and moduli by powers of two: the same mesh."""
     for s, m in ((2.0**-12, 1.0), (2.0**10, 1.0), (1.0, 2.0**10), (2.0**-12, 2.0**-12)):
         scaled = cell(120e3 * m, 0.34, 0.025 * s, (1,), 1.0 * s, 0.03 * s)
-        assert scaled.resolution == COPPER.resolution
+        assert same(scaled.resolution, COPPER.resolution)
 
 
 def test_a_number_stays_possible() -> None:

@@ -371,3 +371,41 @@ def test_rows_of_a_state_are_the_minima() -> None:
     groups = [len(list(rows)) for _, rows in groupby(keys)]
     assert max(groups) >= 3
     assert (state.line_load * state.weight).sum() == pytest.approx(force.sum(), rel=1e-12)
+
+
+@pytest.mark.parametrize("pull", [(0.05, 0.0), (0.12, 0.004), (0.2, 0.0)])
+def test_newton_finds_the_rest_of_a_fibril_pulled_into_a_bend(pull: tuple[float, float]) -> None:
+    """Where it touches both sides of the bend at once, forces balance to round-off: there is no kink to end on.
+
+    A rigid fibril across the bend may move in its plane; contact with the bend balances the pull, N.
+    """
+    nodes = slice(len(BEND), len(BEND) + 5)
+
+    def at(place: Floats) -> tuple[float, Floats, Floats, PenaltyContact, Floats]:
+        term, q = contact_term(fibrils_through([BEND, across(place)], radius=R), penalty=P, per_element=2)
+        energy, gradient, pattern, data = assembled(term, q)
+        moves = np.zeros((2, len(q)))
+        for k in range(2):
+            moves[k].reshape(-1, 9)[nodes, k] = 1.0
+        tangent = np.array([[a @ multiply(pattern, data, b) for b in moves] for a in moves])
+        return energy - place @ pull, moves @ gradient - pull, tangent, term, q
+
+    def across(place: Floats) -> Floats:
+        return straight([*place, -0.32], [*place, 0.31], 4)
+
+    place = np.array([-0.2, 0.013])
+    for _ in range(40):
+        energy, residual, tangent, term, q = at(place)
+        if np.abs(residual).max() < 1e-12:
+            break
+        curvature, axes = np.linalg.eigh(tangent)
+        step = -axes @ ((axes.T @ residual) / np.maximum(np.abs(curvature), 1e-2))
+        step *= min(1.0, 0.1 / np.linalg.norm(step))
+        while at(place + step)[0] > energy + 1e-4 * step @ residual + 1e-15:
+            step /= 2
+        place = place + step
+    assert np.abs(residual).max() < 1e-12  # N, of pulls of 0.05 and more
+    assert np.linalg.eigvalsh(tangent).min() > 0.0
+    found = term.touching(q)
+    legs = np.sign(found.position_b[(found.fibril_b == 0)] - (len(BEND) - 1) / 2)
+    assert {-1.0, 1.0} <= set(legs.tolist())

@@ -78,7 +78,7 @@ def contacts_of(design: Design, mesh: FibrilMesh, configuration: Configuration) 
         mesh,
         configuration,
         design.contact,
-        per_element=design.numerics.contact_points,
+        per_element=design.resolution.contact_points,
         conduction=design.electrical.conduction,
     )
 

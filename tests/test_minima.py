@@ -15,12 +15,15 @@ from numpy.polynomial import Polynomial
 from scipy.optimize import brentq, minimize_scalar
 from test_contact_kernel import assembled, forces
 
+import circuittex as ct
 from circuittex.base.arrays import Floats
 from circuittex.contact.extract import contact_state
+from circuittex.contact.merge import merge_contacts
 from circuittex.contact.penalty import PenaltyContact
 from circuittex.contact.share import share, shares
 from circuittex.contact.state import ContactState
-from circuittex.design import ContactLaw
+from circuittex.design import ContactLaw, Probe, Terminal
+from circuittex.electrical.fields import solve_potentials
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.pattern import multiply
@@ -409,3 +412,33 @@ def test_newton_finds_the_rest_of_a_fibril_pulled_into_a_bend(pull: tuple[float,
     found = term.touching(q)
     legs = np.sign(found.position_b[(found.fibril_b == 0)] - (len(BEND) - 1) / 2)
     assert {-1.0, 1.0} <= set(legs.tolist())
+
+
+@pytest.mark.parametrize("power", [-12, 10])
+@pytest.mark.parametrize("mesh", CASES)
+def test_another_scale_changes_no_bit(mesh: FibrilMesh, power: int) -> None:
+    """Lengths times 2^k: energy times 2^3k, forces 2^2k, tangent 2^k."""
+    s = 2.0**power
+    lines = [s * mesh.position[a:b] for a, b in pairwise(mesh.first_node)]
+    scaled = fibrils_through(lines, order=mesh.order, radius=0.25 * s, length=s * mesh.length)
+    (energy, gradient, _, data), (e, g, _, d) = (
+        assembled(*contact_term(m, penalty=P, skin=0.1 * m.radius[0])) for m in (mesh, scaled)
+    )
+    assert e == s**3 * energy
+    assert np.array_equal(g, s**2 * gradient)
+    assert np.array_equal(d, s * data)
+
+
+def test_current_takes_the_short_way_where_a_loop_touches_itself() -> None:
+    """A coil of two turns that touch: fields and circuit agree on a resistance below that of its length."""
+    mesh = coil(2, 0.27, 0.7, 24)
+    contacts = state_of(mesh)
+    ends = [Terminal("in", (("warp1", -1),)), Terminal("out", (("warp1", 1),))]
+    circuit = ct.build_circuit(contacts, ends)
+    current = ct.solve_nodal(circuit, {"in": 1.0, "out": 0.0}).port_current[0]
+    alone = mesh.electrical_conductivity[0] * mesh.area[0] / mesh.length[0]
+    assert current > 1.0001 * alone
+    merged = ct.solve_nodal(ct.build_circuit(merge_contacts(contacts, 0.2), ends), {"in": 1.0, "out": 0.0})
+    assert merged.port_current[0] == pytest.approx(current, rel=1e-2)
+    (found,) = solve_potentials(contacts, ends, [Probe("through", "in", "out", 1.0)])
+    assert found.currents[0] == pytest.approx(current, rel=1e-9)

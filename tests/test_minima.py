@@ -48,7 +48,9 @@ def stationary(x: Floats, mesh: FibrilMesh, fibril: int) -> list[tuple[float, fl
     for k in range(n):
         piece = [Polynomial(curve.c[::-1, k, c]) for c in range(3)]
         slope = sum(((y - xc) * y.deriv() for y, xc in zip(piece, x, strict=True)), Polynomial([0.0]))
-        slope = slope.trim(1e-14 * np.abs(slope.coef).max())  # the last interval is a parabola: less than a fifth degree
+        slope = slope.trim(
+            1e-14 * np.abs(slope.coef).max()
+        )  # the last interval is a parabola: less than a fifth degree
         # A double root is no place; a simple one has an imaginary part of round-off at the most.
         roots = [root.real for root in slope.roots() if abs(root.imag) < 1e-9 and 0.0 <= root.real < 1.0]
         places += [(k + root, np.sign(slope.deriv()(root))) for root in roots]

@@ -15,12 +15,15 @@ from numpy.polynomial import Polynomial
 from scipy.optimize import brentq, minimize_scalar
 from test_contact_kernel import assembled, forces
 
+import circuittex as ct
 from circuittex.base.arrays import Floats
 from circuittex.contact.extract import contact_state
+from circuittex.contact.merge import merge_contacts
 from circuittex.contact.penalty import PenaltyContact
 from circuittex.contact.share import share, shares
 from circuittex.contact.state import ContactState
-from circuittex.design import ContactLaw
+from circuittex.design import ContactLaw, Probe, Terminal
+from circuittex.electrical.fields import solve_potentials
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.pattern import multiply
@@ -45,6 +48,9 @@ def stationary(x: Floats, mesh: FibrilMesh, fibril: int) -> list[tuple[float, fl
     for k in range(n):
         piece = [Polynomial(curve.c[::-1, k, c]) for c in range(3)]
         slope = sum(((y - xc) * y.deriv() for y, xc in zip(piece, x, strict=True)), Polynomial([0.0]))
+        slope = slope.trim(
+            1e-14 * np.abs(slope.coef).max()
+        )  # the last interval is a parabola: less than a fifth degree
         # A double root is no place; a simple one has an imaginary part of round-off at the most.
         roots = [root.real for root in slope.roots() if abs(root.imag) < 1e-9 and 0.0 <= root.real < 1.0]
         places += [(k + root, np.sign(slope.deriv()(root))) for root in roots]
@@ -371,3 +377,71 @@ def test_rows_of_a_state_are_the_minima() -> None:
     groups = [len(list(rows)) for _, rows in groupby(keys)]
     assert max(groups) >= 3
     assert (state.line_load * state.weight).sum() == pytest.approx(force.sum(), rel=1e-12)
+
+
+@pytest.mark.parametrize("pull", [(0.05, 0.0), (0.12, 0.004), (0.2, 0.0)])
+def test_newton_finds_the_rest_of_a_fibril_pulled_into_a_bend(pull: tuple[float, float]) -> None:
+    """Where it touches both sides of the bend at once, forces balance to round-off: there is no kink to end on.
+
+    A rigid fibril across the bend may move in its plane; contact with the bend balances the pull, N.
+    """
+    nodes = slice(len(BEND), len(BEND) + 5)
+
+    def at(place: Floats) -> tuple[float, Floats, Floats, PenaltyContact, Floats]:
+        term, q = contact_term(fibrils_through([BEND, across(place)], radius=R), penalty=P, per_element=2)
+        energy, gradient, pattern, data = assembled(term, q)
+        moves = np.zeros((2, len(q)))
+        for k in range(2):
+            moves[k].reshape(-1, 9)[nodes, k] = 1.0
+        tangent = np.array([[a @ multiply(pattern, data, b) for b in moves] for a in moves])
+        return energy - place @ pull, moves @ gradient - pull, tangent, term, q
+
+    def across(place: Floats) -> Floats:
+        return straight([*place, -0.32], [*place, 0.31], 4)
+
+    place = np.array([-0.2, 0.013])
+    for _ in range(40):
+        energy, residual, tangent, term, q = at(place)
+        if np.abs(residual).max() < 1e-12:
+            break
+        curvature, axes = np.linalg.eigh(tangent)
+        step = -axes @ ((axes.T @ residual) / np.maximum(np.abs(curvature), 1e-2))
+        step *= min(1.0, 0.1 / np.linalg.norm(step))
+        while at(place + step)[0] > energy + 1e-4 * step @ residual + 1e-15:
+            step /= 2
+        place = place + step
+    assert np.abs(residual).max() < 1e-12  # N, of pulls of 0.05 and more
+    assert np.linalg.eigvalsh(tangent).min() > 0.0
+    found = term.touching(q)
+    legs = np.sign(found.position_b[(found.fibril_b == 0)] - (len(BEND) - 1) / 2)
+    assert {-1.0, 1.0} <= set(legs.tolist())
+
+
+@pytest.mark.parametrize("power", [-12, 10])
+@pytest.mark.parametrize("mesh", CASES)
+def test_another_scale_changes_no_bit(mesh: FibrilMesh, power: int) -> None:
+    """Lengths times 2^k: energy times 2^3k, forces 2^2k, tangent 2^k."""
+    s = 2.0**power
+    lines = [s * mesh.position[a:b] for a, b in pairwise(mesh.first_node)]
+    scaled = fibrils_through(lines, order=mesh.order, radius=0.25 * s, length=s * mesh.length)
+    (energy, gradient, _, data), (e, g, _, d) = (
+        assembled(*contact_term(m, penalty=P, skin=0.1 * m.radius[0])) for m in (mesh, scaled)
+    )
+    assert e == s**3 * energy
+    assert np.array_equal(g, s**2 * gradient)
+    assert np.array_equal(d, s * data)
+
+
+def test_current_takes_the_short_way_where_a_loop_touches_itself() -> None:
+    """A coil of two turns that touch: fields and circuit agree on a resistance below that of its length."""
+    mesh = coil(2, 0.27, 0.7, 24)
+    contacts = state_of(mesh)
+    ends = [Terminal("in", (("warp1", -1),)), Terminal("out", (("warp1", 1),))]
+    circuit = ct.build_circuit(contacts, ends)
+    current = ct.solve_nodal(circuit, {"in": 1.0, "out": 0.0}).port_current[0]
+    alone = mesh.electrical_conductivity[0] * mesh.area[0] / mesh.length[0]
+    assert current > 1.0001 * alone
+    merged = ct.solve_nodal(ct.build_circuit(merge_contacts(contacts, 0.2), ends), {"in": 1.0, "out": 0.0})
+    assert merged.port_current[0] == pytest.approx(current, rel=1e-2)
+    (found,) = solve_potentials(contacts, ends, [Probe("through", "in", "out", 1.0)])
+    assert found.currents[0] == pytest.approx(current, rel=1e-9)

@@ -99,12 +99,7 @@ def _find(curve: Any, hull: Any, fibrils: Any, points: Any, rows: Any, found: An
     # Taken out of their tuples once: to do so for every point would cost as much as the search.
     r, x, bulge, tangent, bend, speed = curve.r, scratch.x, hull.bulge, hull.tangent, hull.bend, hull.least_speed
     interval, other, first, last, turn = rows.interval, rows.fibril, rows.first, rows.last, hull.turn
-    first_interval, first_node, fibril, radius = (
-        fibrils.first_interval,
-        fibrils.first_node,
-        fibrils.fibril,
-        fibrils.radius,
-    )
+    fibril, radius, first_interval = fibrils.fibril, fibrils.radius, fibrils.first_interval
     count = 0
     for i in range(interval.shape[0]):
         a, g = interval[i], other[i]
@@ -112,12 +107,8 @@ def _find(curve: Any, hull: Any, fibrils: Any, points: Any, rows: Any, found: An
         own = f == g
         if own and turn[last[i] + 1] - turn[a] < QUARTER and turn[a + 1] - turn[first[i]] < QUARTER:
             continue
-        base, node, n, reach = (
-            first_interval[g],
-            first_node[g],
-            first_interval[g + 1] - first_interval[g],
-            radius[f] + radius[g],
-        )
+        base, n, reach = first_interval[g], first_interval[g + 1] - first_interval[g], radius[f] + radius[g]
+        node = fibrils.first_node[g]
         parity = (a - first_interval[f]) % points.shape[0]
         for p in range(points.shape[1]):
             t = points[parity, p]

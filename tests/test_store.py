@@ -283,7 +283,7 @@ def test_reading_and_appending_do_not_hinder_each_other(stored: Path) -> None:
 
 
 def test_records_of_paths_that_came_on_side_by_side_are_loaded_path_by_path(tmp_path: Path) -> None:
-    study = synthetic_study(3, contacts=10, rows=(1,), paths=("stretch", "shear"))
+    study = synthetic_study(3, contacts=10, rows=(1,), loadings=("stretch", "shear"))
     path = tmp_path / "results.h5"
     write_study_start(path, replace(study, records=()))
     for number in (0, 3, 1, 4, 2):

@@ -27,8 +27,8 @@ class Record:
 
     name: str
     """For example 'relaxed' or 'stretch-0.05'."""
-    path: str
-    """Name of the loading path; empty for the relaxed state."""
+    loading: str
+    """Name of the loading path that led here; empty for the relaxed state."""
     strain: float
     """The strain that labels the state."""
     gradient: Floats
@@ -109,7 +109,7 @@ class Study:
     initial: Configuration
     """The configuration before the first relaxation."""
     records: tuple[Record, ...]
-    """The recorded states: the relaxed one, then path by path in the order of the design."""
+    """The recorded states: the relaxed one, then loading by loading in the order of the design."""
     errors: tuple[ErrorEstimate, ...] = ()
     """Estimated discretisation errors, in the order of their states; not every state has one."""
     branches: tuple[BranchCheck, ...] = ()
@@ -129,16 +129,16 @@ class Study:
         return check if check is not None and check.bifurcation else None
 
 
-Finding = ErrorEstimate | BranchCheck
-"""What is found out about a recorded state after it was recorded, and names it."""
-FINDINGS: dict[type[Finding], str] = {ErrorEstimate: "errors", BranchCheck: "branches"}
-"""Kind of finding -> the field of a `Study` that holds them."""
+Examination = ErrorEstimate | BranchCheck
+"""What is found out about a state after it was recorded, and names it."""
+EXAMINATIONS: dict[type[Examination], str] = {ErrorEstimate: "errors", BranchCheck: "branches"}
+"""Kind of examination -> the field of a `Study` that holds them."""
 
 
-def with_finding(study: Study, finding: Finding) -> Study:
-    """The study with one more finding, in the order of its states."""
-    field = FINDINGS[type(finding)]
+def with_examination(study: Study, examination: Examination) -> Study:
+    """The study with one more examination, in the order of its states."""
+    field = EXAMINATIONS[type(examination)]
     place = {record.name: number for number, record in enumerate(study.records)}
-    found: list[Finding] = [*getattr(study, field), finding]
+    found: list[Examination] = [*getattr(study, field), examination]
     changed: dict[str, Any] = {field: tuple(sorted(found, key=lambda each: place[each.state]))}
     return replace(study, **changed)

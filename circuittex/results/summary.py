@@ -113,11 +113,11 @@ def table(study: Study) -> str:
     study took, what the branch checks found, and whether ngspice confirmed it. A blank line parts the loading paths."""
     head = ["state", "Fx warp N", "Fy weft N", *(f"{probe.name} A" for probe in study.design.probes)]
     rows = [[*head, "Ry ohm", "Rc ohm", "iterations", "routes differ"]]
-    path = ""
+    loading = ""
     for record in study.records:
-        if record.path != path:
+        if record.loading != loading:
             rows.append([""] * len(rows[0]))
-            path = record.path
+            loading = record.loading
         numbers = [record.clamp_force[0, 0], record.clamp_force[1, 1], *record.currents, record.fit.Ry, record.fit.Rc]
         rows.append([record.name, *(f"{number:#.4g}" for number in numbers)])
         rows[-1] += [str(record.iterations), f"{difference(record):.1e}"]
@@ -238,7 +238,7 @@ def _state(study: Study, record: Record, step: EnergyBalance | None) -> dict[str
     error, check = study.error_of(record.name), study.check_of(record.name)
     return {
         "name": record.name,
-        "path": record.path,
+        "path": record.loading,
         "strain": record.strain,
         "gradient": record.gradient,
         "residual_N": record.residual,

@@ -73,11 +73,11 @@ def record_state(study: Study, step: Step, reached: Increment, say: Callable[[st
     fit = fit_network([f.currents[0] for f in fields], design)
     merged = simplified(design, contacts).contacts
     convergence = np.empty((0, 2))
-    if not step.path:
+    if not step.loading:
         convergence = field_convergence(contacts, design.terminals, design.probes, fields)
     return Record(
         name=step.name,
-        path=step.path,
+        loading=step.loading,
         strain=step.strain,
         gradient=step.after,
         configuration=equilibrium.configuration,

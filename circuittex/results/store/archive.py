@@ -26,6 +26,8 @@ MEANING, UNIT, ATTRIBUTES = "description", "unit", "about"
 RESERVED = {MEANING, ATTRIBUTES}
 """Attributes of groups that are no fields."""
 
+Former = Mapping[str, Mapping[str, str]]
+"""Dataclass -> field -> the name that it has in files of an older layout."""
 _SCALARS = (bool, int, float, str)
 _COMPRESS_ABOVE = 256  # elements; below, chunking costs more than compression saves
 
@@ -53,12 +55,14 @@ def registry(root: type) -> dict[str, type]:
 class Digests:
     """Content digests; remembers the objects it has seen, which must stay alive and unchanged meanwhile.
 
-    `without` names fields of dataclasses that do not count: those that an older file lacks.
+    `without` names fields of dataclasses that do not count: those that an older file lacks. `former` has the names
+    under which an older file counts fields: dataclass -> field -> its name there.
     """
 
-    def __init__(self, without: Mapping[str, Set[str]] | None = None) -> None:
+    def __init__(self, without: Mapping[str, Set[str]] | None = None, former: Former | None = None) -> None:
         self._known: dict[int, tuple[object, str]] = {}
         self._without = without if without is not None else {}
+        self._former = former if former is not None else {}
 
     def __call__(self, value: object) -> str:
         """Digest of arrays, scalars, tuples and dataclasses; equal exactly for equal types and equal bits.
@@ -79,9 +83,10 @@ class Digests:
         elif is_dataclass(value) and not isinstance(value, type):
             result.update(type(value).__name__.encode())
             lacking = self._without.get(type(value).__name__, set())
+            former = self._former.get(type(value).__name__, {})
             for field in fields(value):
                 if field.name not in lacking:
-                    result.update(f"{field.name}={self(getattr(value, field.name))}".encode())
+                    result.update(f"{former.get(field.name, field.name)}={self(getattr(value, field.name))}".encode())
         elif value is None or type(value) in _SCALARS:
             text = value.hex() if isinstance(value, float) else repr(value)
             result.update(f"{type(value).__name__}{text}".encode())
@@ -159,8 +164,9 @@ class Writer:
 class Reader:
     """Rebuilds objects from an open HDF5 file; what is one object in the file becomes one object in memory."""
 
-    def __init__(self, types: Mapping[str, type]) -> None:
+    def __init__(self, types: Mapping[str, type], former: Former | None = None) -> None:
         self._types = types
+        self._former = former if former is not None else {}
         self._built: dict[int, Any] = {}
         self.lacking: dict[str, set[str]] = {}
         """Dataclass -> fields that it has by default here and that the file lacks."""
@@ -195,14 +201,17 @@ class Reader:
 
     def dataclass(self, stored: h5py.Group, kind: type) -> Any:
         """The dataclass whose fields are in a group; those that an older version did not have take their defaults."""
-        names = {field.name for field in fields(kind)}
-        there = {name for name in (*stored, *stored.attrs) if name not in RESERVED and not name.startswith("@")}
+        former = self._former.get(kind.__name__, {})
+        present = {former.get(field.name, field.name): field.name for field in fields(kind)}
+        names = set(present.values())
+        found = {name for name in (*stored, *stored.attrs) if name not in RESERVED and not name.startswith("@")}
+        there = {present.get(name, name) for name in found}
         optional = {f.name for f in fields(kind) if f.default is not MISSING or f.default_factory is not MISSING}
         if there - names or names - there - optional:
             raise StoreError(f"the fields of {kind.__name__} are not those of this version of circuittex")
         if names - there:
             self.lacking[kind.__name__] = names - there
-        return kind(**{name: self.get(stored, name) for name in names & there})
+        return kind(**{name: self.get(stored, former.get(name, name)) for name in names & there})
 
 
 def _scalar(value: Any) -> Any:

@@ -16,8 +16,8 @@ from circuittex.base.errors import CircuittexError, StoreError
 from circuittex.design import Design
 from circuittex.results.bifurcation import BranchCheck
 from circuittex.results.discretisation import ErrorEstimate
-from circuittex.results.records import FINDINGS, Finding, Record, Study, with_finding
-from circuittex.results.store.archive import ATTRIBUTES, MEANING, Digests, Reader, Writer, registry
+from circuittex.results.records import EXAMINATIONS, Examination, Record, Study, with_examination
+from circuittex.results.store.archive import ATTRIBUTES, MEANING, Digests, Former, Reader, Writer, registry
 from circuittex.results.store.journal import Overlay, changing, commit, finish, overlay
 from circuittex.results.store.meaning import meanings, summary
 
@@ -25,12 +25,14 @@ FORMAT = "circuittex results"
 VERSION = 2
 """Version of the file layout. Files of version 1 are read; others are refused."""
 OLDEST = 1
+FORMER: Former = {"Record": {"loading": "path"}}
+"""Names of fields in files of version 1."""
 NAME = "results.h5"
 """What the file is called in a study's folder."""
 HEAD = ("version", "design", "design_hash", "mesh", "initial")
 """The fields of a `Study` that are known before its first record."""
-NAMES: dict[type[Finding], str] = {ErrorEstimate: "error estimate", BranchCheck: "branch check"}
-"""What findings are called where one is damaged."""
+NAMES: dict[type[Examination], str] = {ErrorEstimate: "error estimate", BranchCheck: "branch check"}
+"""What examinations are called where one is damaged."""
 LIBVER = ("v110", "v110")
 """HDF5 1.10: its metadata carry checksums, and every viewer of the last years reads it."""
 GROUPS = {
@@ -64,9 +66,9 @@ def write_study_start(path: str | Path, study: Study) -> None:
             file.require_group(name).attrs[MEANING] = meaning
         for record in study.records:
             _add(file, "states", record.name, writer, record)
-        for group in FINDINGS.values():
-            for finding in getattr(study, group):
-                _add(file, group, finding.state, writer, finding)
+        for group in EXAMINATIONS.values():
+            for examination in getattr(study, group):
+                _add(file, group, examination.state, writer, examination)
 
     path = Path(path)
     # HDF5 works in memory only: a full disk then meets plain Python I/O, from which one can recover, and not the HDF5
@@ -91,12 +93,12 @@ def append_record(path: str | Path, record: Record) -> None:
     _append(Path(path), "states", record.name, record)
 
 
-def append_finding(path: str | Path, finding: Finding) -> None:
-    """Add a finding about a recorded state to the results file at `path`, in the manner of `append_record`.
+def append_examination(path: str | Path, examination: Examination) -> None:
+    """Add an examination about a recorded state to the results file at `path`, in the manner of `append_record`.
 
     Errors: `StoreError` as there.
     """
-    _append(Path(path), FINDINGS[type(finding)], finding.state, finding)
+    _append(Path(path), EXAMINATIONS[type(examination)], examination.state, examination)
 
 
 def load_study(path: str | Path) -> Study:
@@ -128,19 +130,20 @@ def load_study(path: str | Path) -> Study:
 def _read(path: Path) -> Study:
     with path.open("rb") as handle, h5py.File(overlay(path, handle), "r") as file:
         version = _check_layout(file)
-        reader = Reader(registry(Study))
+        former: Former = FORMER if version == 1 else {}
+        reader = Reader(registry(Study), former)
         start = file if version > 1 else file["study"]
         head = tuple(reader.get(start, name) for name in HEAD)
         records = _members(file["states" if version > 1 else "records"], reader)
-        findings = {kind: _members(file[group], reader) for kind, group in FINDINGS.items() if group in file}
-        digest = Digests(reader.lacking)
+        examinations = {kind: _members(file[group], reader) for kind, group in EXAMINATIONS.items() if group in file}
+        digest = Digests(reader.lacking, former)
         if start.attrs["@digest"] != digest(head):
             raise StoreError("its content does not match its digest")
         study = Study(**dict(zip(HEAD, head, strict=True)), records=())
         study = replace(study, records=_in_order(study.design, _checked(records, "record", digest)))
-        for kind, members in findings.items():
-            for finding in _checked(members, NAMES[kind], digest):
-                study = with_finding(study, finding)
+        for kind, members in examinations.items():
+            for examination in _checked(members, NAMES[kind], digest):
+                study = with_examination(study, examination)
         return replace(study, design=_in_newtons(study.design)) if version == 1 else study
 
 
@@ -151,12 +154,12 @@ def _in_newtons(design: Design) -> Design:
 
 
 def _in_order(design: Design, records: Sequence[Record]) -> tuple[Record, ...]:
-    """The records path by path, whatever the order in which the paths came on; within a path it is theirs."""
+    """The records loading by loading, whatever the order in which these came on; within one it is theirs."""
     rank = {"": 0} | {loading.name: number for number, loading in enumerate(design.loading, start=1)}
-    return tuple(sorted(records, key=lambda record: rank[record.path]))
+    return tuple(sorted(records, key=lambda record: rank[record.loading]))
 
 
-def _append(path: Path, group: str, name: str, value: Record | Finding) -> None:
+def _append(path: Path, group: str, name: str, value: Record | Examination) -> None:
     if not path.is_file():
         raise StoreError(f"{path}: there is no results file here")
     with _as_store_error(path, "cannot be written"), path.open("rb") as handle:
@@ -171,7 +174,7 @@ def _append(path: Path, group: str, name: str, value: Record | Finding) -> None:
         commit(path, changed)
 
 
-def _add(file: h5py.File, group: str, name: str, writer: Writer, value: Record | Finding) -> None:
+def _add(file: h5py.File, group: str, name: str, writer: Writer, value: Record | Examination) -> None:
     members = file[group]
     number = len(members)
     writer.put(members, name, value, summary(type(value)))

@@ -22,6 +22,7 @@ class Material:
     """
 
     name: str
+    """What it is called."""
     youngs_modulus: float = field(
         metadata=number(
             "MPa", "E > 0; the paper's Table I prints 1.26 MPa, its code used 10 MPa", shown="10 MPa", above=0
@@ -55,6 +56,7 @@ class Yarn:
     """
 
     name: str
+    """What it is called."""
     rows: tuple[int, ...]
     """Fibrils in each row."""
     radius: float = field(metadata=number("mm", "of every fibril", shown="0.15 mm", above=0))

@@ -42,7 +42,7 @@ class Record:
     parts: int
     """Parts into which the increment to this state was halved; 1 where it converged as a whole."""
     history: Floats
-    """(n, 4) per iteration of the last part: residual N, energy N mm, shift (`minimise`), step length."""
+    """(n, 4) per iteration of the last part: residual, energy, shift (`minimise`), step length [N, N mm, 1, 1]."""
     clamp_force: Floats
     """(2, 3) total force of the clamps on the +x ends of the warp and the +y ends of the weft, N [40, 41]."""
     end_force: Floats
@@ -64,12 +64,12 @@ class Record:
     verification: Verification
     """How the routes to the currents and voltages agree."""
     field_convergence: Floats
-    """(3, 2) node distance in mm and largest relative current error of the field on the mechanical mesh and on two
+    """(3, 2) node distance and largest relative current error [mm, 1] of the field on the mechanical mesh and on two
     refinements of it, against the circuit; (0, 2) where it was not studied."""
     levels: int
     """Levels in which the fibrils of the centre warp yarn lie at its centre crossing."""
     netlist: str
-    """Path of the detailed sub-circuit, relative to the results folder (if the study has one)."""
+    """File of the detailed sub-circuit, relative to the results folder (if the study has one)."""
 
     @property
     def reaction(self) -> Floats:

@@ -10,13 +10,18 @@ from circuittex.base.errors import FolderError, StoreError
 from circuittex.results.plot import FIGURES
 from circuittex.results.records import Examination, Record, Study, with_examination
 from circuittex.results.report import write_report
-from circuittex.results.store import append_examination, append_record, load_study, write_study_start
+from circuittex.results.store import (
+    RESULTS,
+    append_examination,
+    append_record,
+    complete_change,
+    load_study,
+    write_study_start,
+)
 from circuittex.results.summary import write_summary
 from circuittex.results.vtk.vtu import write_collections, write_vtu
 from circuittex.study.export import netlist_files, simplified, write_netlists
 
-RESULTS = "results.h5"
-"""Name of the HDF5 file in the folder."""
 MARKS = {
     "netlists/*.sub": b"* circuittex ",
     "netlists/*.cir": b"* circuittex ",
@@ -46,6 +51,7 @@ def open_study(folder: Path, study: Study, *, fresh: bool = False) -> Study:
             )
         write_study_start(path, study)
     else:
+        complete_change(path)
         return _continued(path, study)
     return study
 

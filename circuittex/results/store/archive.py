@@ -17,6 +17,7 @@ import h5py
 import numpy as np
 
 from circuittex.base.errors import StoreError
+from circuittex.base.version import __version__
 from circuittex.results.store.meaning import meanings, summary, unit
 
 TYPE = "@type"
@@ -136,14 +137,14 @@ class Writer:
             stored.attrs[TYPE] = "tuple"
             stored.attrs["@length"] = len(value)
             for number, item in enumerate(value):
-                self.put(stored, f"{number:04d}", item, meaning)
+                self.put(stored, f"{number:04d}", item, _told(item, meaning))
         else:
             stored = self._shared.create_group(key)
             stored.attrs[TYPE] = type(value).__name__
             self.fields(stored, value)
         if meaning:
             stored.attrs[MEANING] = meaning
-            if isinstance(stored, h5py.Dataset):
+            if isinstance(stored, h5py.Dataset) and stored.dtype.kind in "iufc":
                 stored.attrs[UNIT] = unit(meaning)
 
     def fields(self, group: h5py.Group, value: Any) -> None:
@@ -151,21 +152,24 @@ class Writer:
         told = meanings(type(value))
         scalars = []
         for field in fields(value):
-            content, meaning = getattr(value, field.name), told.get(field.name, "")
-            if is_dataclass(content) and not isinstance(content, type):
-                meaning = summary(type(content))  # the same wherever it stands: one object, shared
+            content = getattr(value, field.name)
+            meaning = _told(content, told.get(field.name, ""))
             self.put(group, field.name, content, meaning)
             if meaning and (content is None or type(content) in _SCALARS):
-                scalars.append(f"{field.name} [{unit(meaning)}]: {meaning}")
+                of = f" [{unit(meaning)}]" if type(content) in (int, float) else ""
+                scalars.append(f"{field.name}{of}: {meaning}")
         if scalars:
             group.attrs[ATTRIBUTES] = "\n".join(scalars)
 
 
 class Reader:
-    """Rebuilds objects from an open HDF5 file; what is one object in the file becomes one object in memory."""
+    """Rebuilds objects from an open HDF5 file; what is one object in the file becomes one object in memory.
 
-    def __init__(self, types: Mapping[str, type], former: Former | None = None) -> None:
-        self._types = types
+    `former` are names of fields in files of an older layout, `author` the version of circuittex that wrote the file.
+    """
+
+    def __init__(self, types: Mapping[str, type], former: Former | None = None, author: str = "unknown") -> None:
+        self._types, self._author = types, author
         self._former = former if former is not None else {}
         self._built: dict[int, Any] = {}
         self.lacking: dict[str, set[str]] = {}
@@ -196,7 +200,7 @@ class Reader:
         if kind == "tuple":
             return tuple(self.get(stored, f"{number:04d}") for number in range(int(stored.attrs["@length"])))
         if kind not in self._types:
-            raise StoreError(f"unknown type {kind!r}")
+            raise StoreError(f"unknown type {kind!r}; {reader_of(self._author)}")
         return self.dataclass(stored, self._types[kind])
 
     def dataclass(self, stored: h5py.Group, kind: type) -> Any:
@@ -208,10 +212,22 @@ class Reader:
         there = {present.get(name, name) for name in found}
         optional = {f.name for f in fields(kind) if f.default is not MISSING or f.default_factory is not MISSING}
         if there - names or names - there - optional:
-            raise StoreError(f"the fields of {kind.__name__} are not those of this version of circuittex")
+            raise StoreError(
+                f"the fields of {kind.__name__} are not those of circuittex {__version__}; {reader_of(self._author)}"
+            )
         if names - there:
             self.lacking[kind.__name__] = names - there
         return kind(**{name: self.get(stored, former.get(name, name)) for name in names & there})
+
+
+def reader_of(author: str) -> str:
+    """Who can read what this circuittex cannot."""
+    return f"circuittex {author} wrote it and can read it"
+
+
+def _told(value: object, meaning: str) -> str:
+    """What a reader is told of a part: of a dataclass the same wherever it stands, so that it is one object, shared."""
+    return summary(type(value)) if is_dataclass(value) and not isinstance(value, type) else meaning
 
 
 def _scalar(value: Any) -> Any:

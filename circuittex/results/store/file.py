@@ -13,11 +13,12 @@ import h5py
 
 from circuittex.base.atomic import replacing
 from circuittex.base.errors import CircuittexError, StoreError
+from circuittex.base.version import __version__
 from circuittex.design import Design
 from circuittex.results.bifurcation import BranchCheck
 from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.records import EXAMINATIONS, Examination, Record, Study, with_examination
-from circuittex.results.store.archive import ATTRIBUTES, MEANING, Digests, Former, Reader, Writer, registry
+from circuittex.results.store.archive import ATTRIBUTES, MEANING, Digests, Former, Reader, Writer, reader_of, registry
 from circuittex.results.store.journal import Overlay, changing, commit, finish, overlay
 from circuittex.results.store.meaning import meanings, summary
 
@@ -27,7 +28,7 @@ VERSION = 2
 OLDEST = 1
 FORMER: Former = {"Record": {"loading": "path"}}
 """Names of fields in files of version 1."""
-NAME = "results.h5"
+RESULTS = "results.h5"
 """What the file is called in a study's folder."""
 HEAD = ("version", "design", "design_hash", "mesh", "initial")
 """The fields of a `Study` that are known before its first record."""
@@ -101,6 +102,15 @@ def append_examination(path: str | Path, examination: Examination) -> None:
     _append(Path(path), EXAMINATIONS[type(examination)], examination.state, examination)
 
 
+def complete_change(path: str | Path) -> None:
+    """Make the change complete that a kill left half-made at `path`, so that h5py alone reads the file, too.
+
+    Only who may write to the file may call this. Errors: `StoreError` where it cannot be written.
+    """
+    with _as_store_error(Path(path), "cannot be written"):
+        finish(Path(path))
+
+
 def load_study(path: str | Path) -> Study:
     """Everything that was computed, bit for bit, with locked arrays; checked against the digests in the file.
 
@@ -110,7 +120,7 @@ def load_study(path: str | Path) -> Study:
     Errors: `StoreError` where the file is missing, foreign, damaged, or of a newer layout.
     """
     path = Path(path)
-    path = path / NAME if path.is_dir() else path
+    path = path / RESULTS if path.is_dir() else path
     if not path.is_file():
         raise StoreError(f"{path}: there is no results file here")
     for attempt in range(TRIES):
@@ -131,7 +141,7 @@ def _read(path: Path) -> Study:
     with path.open("rb") as handle, h5py.File(overlay(path, handle), "r") as file:
         version = _check_layout(file)
         former: Former = FORMER if version == 1 else {}
-        reader = Reader(registry(Study), former)
+        reader = Reader(registry(Study), former, _author(file))
         start = file if version > 1 else file["study"]
         head = tuple(reader.get(start, name) for name in HEAD)
         records = _members(file["states" if version > 1 else "records"], reader)
@@ -203,11 +213,16 @@ def _check_layout(file: h5py.File) -> int:
         raise StoreError("this is not a results file of circuittex")
     version = int(file.attrs["format_version"])
     if not OLDEST <= version <= VERSION:
-        newer = "a newer circuittex reads it" if version > VERSION else ""
         raise StoreError(
-            f"its layout is version {version}; this circuittex reads {OLDEST} to {VERSION} {newer}".strip()
+            f"its layout is version {version} and circuittex {__version__} reads {OLDEST} to {VERSION}; "
+            f"{reader_of(_author(file))}"
         )
     return version
+
+
+def _author(file: h5py.File) -> str:
+    """The version of circuittex that wrote the file, in any layout."""
+    return str(file.attrs.get("version") or file.get("study", file).attrs.get("version", "of another version"))
 
 
 @contextlib.contextmanager

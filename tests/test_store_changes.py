@@ -93,6 +93,22 @@ def test_reading_and_appending_do_not_hinder_each_other(stored: Path) -> None:
     assert len(load_study(stored).records) == len(STUDY.records) + 1
 
 
+def test_a_reader_beside_a_run_sees_one_state_more_at_a_time(tmp_path: Path) -> None:
+    """`load_study` never fails and never sees less than before, however often the file changes meanwhile."""
+    path = tmp_path / "results.h5"
+    write_study_start(path, replace(STUDY, records=STUDY.records[:1]))
+    seen = [1]
+    with subprocess.Popen([sys.executable, "-c", CHILD, str(path)], stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == "1\n"
+        until = time.monotonic() + 1.0
+        while time.monotonic() < until:
+            seen.append(len(load_study(path).records))
+        child.kill()
+    assert seen == sorted(seen)
+    assert seen[-1] > 5
+
+
 def test_what_is_there_is_not_written_again(tmp_path: Path) -> None:
     """A large file grows by what is new: all but a few pages of the old one stay as they are."""
     study = synthetic_study(3, contacts=3000)

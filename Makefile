@@ -13,7 +13,7 @@ export VENV PYTHON
 .DEFAULT_GOAL := help
 
 help: ## list the targets
-	@grep -E '^[a-z]+:.*##' Makefile | sed -E 's/^([a-z]+):.*## /make \1\t/' | expand -t 14
+	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/^([a-z-]+):.*## /make \1\t/' | expand -t 18
 
 run: $(VENV)/.ready ngspice ## compute DESIGN (the plain weave of the paper) into OUT
 	$(PY) -m circuittex run $(DESIGN) --out $(OUT)

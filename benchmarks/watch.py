@@ -88,6 +88,12 @@ class WatchedTerm:
         self.watch.add(self.parts[1], clock)
         return energy
 
+    def longest(self, q: Floats, direction: Floats) -> float:
+        clock = time.perf_counter()
+        part = self.term.longest(q, direction)
+        self.watch.add(self.parts[1], clock)
+        return part
+
     def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
         clock = time.perf_counter()
         energy = self.term.assemble(q, pattern, gradient, data, softening)

@@ -78,6 +78,9 @@ class DeadLoad:
     def energy(self, q: Floats) -> float:
         return float(-self.force @ q)
 
+    def longest(self, q: Floats, direction: Floats) -> float:
+        return 1.0
+
     def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
         gradient -= self.force
         return self.energy(q)

@@ -163,10 +163,10 @@ def contact_term(
 
 
 def small_cell(
-    rows: tuple[int, ...] = (1, 2), *, elements: int = 6, order: int = 2, **numerics: float | int | str
+    rows: tuple[int, ...] = (1, 2), *, yarns: int = 2, elements: int = 6, order: int = 2, **numerics: float | int | str
 ) -> tuple[Design, FibrilMesh]:
     """A cell of two by two yarns with few elements, and its mesh."""
-    design = plain_weave(yarns=2, rows=rows)
+    design = plain_weave(yarns=yarns, rows=rows)
     choice = replace(design.numerics, elements=elements, order=order, **numerics)
     design = replace(design, numerics=choice)
     return design, build_mesh(design)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from circuittex.base.arrays import Floats
@@ -85,14 +87,17 @@ def _record(
         section_force=0.03 + 0.01 * np.sin(mesh.xi[mesh.elements[:, 0]] + mesh.element_fibril) + 0.2 * strain,
         contacts=state,
         fields=tuple(_fields(design, mesh, state, number, strain, rng) for number in range(len(design.probes))),
-        fit=Fit(
-            Ry=0.2827 - 0.01 * strain,
-            Rc=210.0 - 10.0 * slope * strain,
-            residual=0.03,
-            covariance=np.array([[1e-6, 0.0], [0.0, 4.0]]),
-            weighting="relative",
-            warnings=(),
-            currents=np.array([0.884, 0.0066, 0.0078]),
+        fit=with_network(
+            Fit(
+                Ry=0.2827 - 0.01 * strain,
+                Rc=210.0 - 10.0 * slope * strain,
+                residual=0.03,
+                covariance=np.array([[1e-6, 0.0], [0.0, 4.0]]),
+                weighting="relative",
+                warnings=(),
+                currents=np.array([0.884, 0.0066, 0.0078]),
+            ),
+            (len(design.weave.warp), len(design.weave.weft)),
         ),
         reduced_difference=3e-12,
         field_convergence=np.empty((0, 2)) if loading else np.array([[0.2, 4e-6], [0.1, 1e-6], [0.05, 2.5e-7]]),
@@ -194,4 +199,18 @@ def _fields(
         heat_out=total,
         peak_temperature=float(temperature.max()),
         unreached=np.array([mesh.n_fibrils - 1]),
+    )
+
+
+def with_network(fit: Fit, shape: tuple[int, int]) -> Fit:
+    """A fit of one pair with its network of a weave of `shape`."""
+    return replace(
+        fit,
+        kinds=("conductive",),
+        kind_resistance=np.array([fit.Ry]),
+        pairs=("conductive x conductive",),
+        pair_resistance=np.array([fit.Rc]),
+        yarns=np.full(sum(shape), fit.Ry),
+        crossings=np.full(shape, fit.Rc),
+        pair_errors=np.array([0.06, 0.02]),
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import subprocess
 import sys
@@ -18,7 +17,7 @@ from synthetic_study import synthetic_study
 import circuittex
 from circuittex.base.errors import ConvergenceError
 from circuittex.base.lock import locked
-from circuittex.command.cli import Progress, main
+from circuittex.command.cli import main
 from circuittex.command.exit_codes import ExitCode, code_of
 from circuittex.design import Design, load_design, starter
 from circuittex.electrical.network.circuit import CONTACT, Circuit
@@ -303,41 +302,17 @@ def test_an_error_of_circuittex_itself_has_a_code_and_a_sentence(
         main(command)
 
 
-# Progress
+def test_what_failed_then_counts_whatever_is_installed_now(
+    design_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def failed(v: Verification) -> Verification:
+        return replace(v, routes=("fields", "nodal"), ngspice_checked=False, simulator_failed=True, note="it crashed")
 
-
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
-
-
-def test_progress_is_one_updating_line_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", "20")
-    stream = Terminal()
-    with Progress(stream) as progress:
-        progress("first")
-        progress("second " * 10)
-    text = stream.getvalue()
-    assert "\n" not in text
-    assert text.split("\r\x1b[2K") == ["", "first", ("second " * 10)[:19], ""]
-
-
-def test_progress_is_plain_lines_elsewhere() -> None:
-    stream = io.StringIO()
-    with Progress(stream) as progress:
-        progress("first")
-        progress("second\n")
-    assert stream.getvalue() == "first\nsecond\n"
-
-
-def test_what_ends_with_a_line_break_stays_on_the_terminal() -> None:
-    stream = Terminal()
-    with Progress(stream) as progress:
-        progress("first")
-        progress("3 of 21 states are there already\n")
-        progress("second")
-    start = "\r\x1b[2K"
-    assert stream.getvalue() == f"{start}first{start}3 of 21 states are there already\n{start}second{start}"
+    replace_study(monkeypatch, with_verification(failed))
+    monkeypatch.setenv("CIRCUITTEX_NGSPICE", "")
+    out = tmp_path / "out"
+    assert main(["run", str(design_file), "--out", str(out), "--quiet"]) == ExitCode.SIMULATOR
+    assert f"ngspice failed in stretch-0.0250: see the report; 'circuittex verify {out}'" in capsys.readouterr().err
 
 
 # netlist, verify, report
@@ -464,6 +439,12 @@ def test_verify_without_ngspice_is_no_confirmation(
     monkeypatch.setattr("circuittex.electrical.spice.ngspice.find_ngspice", lambda: None)
     assert main(["verify", str(computed), "--state", "relaxed"]) == ExitCode.NOT_CHECKED
     assert "NOT confirmed" in capsys.readouterr().out
+
+
+def test_an_ngspice_too_slow_for_a_circuit_has_not_failed(computed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is there, but nobody asked it: what that says differs from a crash."""
+    monkeypatch.setattr("circuittex.electrical.spice.ngspice.estimated_seconds", lambda resistors: 1e6)
+    assert main(["verify", str(computed), "--state", "relaxed"]) == ExitCode.NOT_CHECKED
 
 
 def test_verify_finds_a_route_that_disagrees(

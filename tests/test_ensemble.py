@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import csv
 import json
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +22,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import circuittex.study.ensemble.run as run_module
-from circuittex.base.errors import ConvergenceError, DesignError, FolderError
+from circuittex.base.errors import CircuittexWarning, ConvergenceError, DesignError, FolderError
 from circuittex.command.cli import main
 from circuittex.command.exit_codes import ExitCode
 from circuittex.design import Design, design_hash, load_design, plain_weave, starter, uniaxial
@@ -519,8 +520,24 @@ def test_an_ensemble_whose_members_all_fail_is_no_success(
 ) -> None:
     file = tmp_path / "weave.toml"
     file.write_text(starter(), encoding="utf-8")
-    lost = replace(made_up, failures=("no equilibrium",) * 20, disagreeing=((),) * 20)
+    failed = replace(made_up, failures=("no equilibrium",) * 20, disagreeing=((),) * 20)
+    nothing = replace(failed, values=np.full_like(made_up.values, np.nan))
     words = [str(file), "--members", "20", "--out", str(tmp_path / "e"), "--quiet"]
-    code, _ = run_command(monkeypatch, lost, *words)
-    assert code == ExitCode.NO_EQUILIBRIUM
-    assert "all 20 members failed" in capsys.readouterr().err
+    # States that were found before a member failed are results, and are kept.
+    for ensemble, expected in ((failed, ExitCode.PARTLY), (nothing, ExitCode.NO_EQUILIBRIUM)):
+        code, _ = run_command(monkeypatch, ensemble, *words)
+        assert code == expected
+        assert "all 20 members failed" in capsys.readouterr().err
+
+
+def test_what_a_member_notes_of_its_folder_has_been_said_of_the_ensembles(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A hundred members on a share without locks are a hundred locks that nobody holds, and one thing to say."""
+
+    def noting(*_: object, **__: object) -> None:
+        warnings.warn("its file system has no locks", CircuittexWarning, stacklevel=1)  # here warnings are errors
+        raise ConvergenceError("no equilibrium")
+
+    monkeypatch.setattr("circuittex.study.ensemble.member.run_study", noting)
+    assert compute_member(perturbed(STRETCHED), str(tmp_path / "member")).failure == "no equilibrium"

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fabrics import small_cell
+from synthetic_study import with_network
 
 from circuittex.contact.extract import contacts_of
 from circuittex.contact.state import ContactState
@@ -24,7 +25,7 @@ from circuittex.study.export import detailed_circuit, detailed_netlist, probe_ne
 from circuittex.study.run import run_study
 
 PAGE = Path(__file__).parents[1] / "docs" / "netlist.md"
-FIT = Fit(0.3, 200.0, 0.0, np.zeros((2, 2)), "relative", (), np.zeros(3))
+FIT = with_network(Fit(0.3, 200.0, 0.0, np.zeros((2, 2)), "relative", (), np.zeros(3)), (4, 4))
 
 
 @pytest.fixture(scope="module")

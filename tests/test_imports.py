@@ -19,7 +19,7 @@ ROOMS_OF = {"electrical", "results", "study"}  # folders that hold rooms of thei
 # is no room allows one module only.
 STATE = {"contact.state", "geometry.mesh"}
 ROUTES = {"electrical.fields", "electrical.network", "netlist", "electrical.spice"}
-RESULT_TYPES = {*STATE, "design", "electrical.fields", "fit", "mech.configuration"}
+RESULT_TYPES = {*STATE, "design", "electrical.fields", "electrical.network.ports", "fit", "mech.configuration"}
 ALLOWED: dict[str, set[str]] = {
     "base": set(),
     "design": set(),

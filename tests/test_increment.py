@@ -53,13 +53,16 @@ def clamps(cell: Cell, state: Increment) -> Floats:
 
 
 def straight_cell(**numerics: Any) -> tuple[Design, FibrilMesh]:
-    """Two by two single fibrils of 4 mm, straight, in one plane and without contact: closed forms hold."""
+    """Two by two single fibrils of 4 mm, straight, the weft 10 mm above the warp, out of touch: closed forms hold."""
     design, mesh = small_cell((1,), tolerance=f"{TIGHT} N", **numerics)
     along = np.eye(3)[mesh.yarn_axis[mesh.yarn[mesh.node_fibril]]]
     up = np.tile([0.0, 0.0, 1.0], (mesh.n_nodes, 1))
     directors = np.stack([np.cross(up, along), up], axis=1)
-    flat = replace(mesh, position=mesh.position * [1.0, 1.0, 0.0], directors=directors)
-    return replace(design, contact=replace(design.contact, penalty=1e-12)), flat
+    above = 10.0 * along[:, 1:2] * up
+    under = replace(design.weave, draft=tuple((0,) * len(row) for row in design.weave.draft))
+    return replace(design, weave=under), replace(
+        mesh, position=mesh.position * [1.0, 1.0, 0.0] + above, directors=directors
+    )
 
 
 def pull(stretch: float) -> float:
@@ -217,7 +220,7 @@ def test_halves_lead_where_the_whole_step_leads(cell: Cell) -> None:
 
 def test_a_step_that_starts_inside_out_is_halved() -> None:
     """Fibrils turned by 140 degrees have their directors behind them, even as predicted; half way they do not."""
-    design, mesh = straight_cell(elements=4)
+    design, mesh = straight_cell(yarns=1, elements=4)  # one fibril each way: nothing meets where they buckle
     angle = np.deg2rad(140)
     target = 1.2 * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     said: list[str] = []
@@ -227,7 +230,7 @@ def test_a_step_that_starts_inside_out_is_halved() -> None:
     assert len(said) == 1
     assert "inside out" in said[0]
     force = clamp_force(mesh, state.equilibrium.reaction)
-    assert force[0, :2] == pytest.approx(2 * pull(1.2) * target[:, 0] / 1.2, abs=1e-5)
+    assert force[0, :2] == pytest.approx(pull(1.2) * target[:, 0] / 1.2, abs=1e-5)
 
 
 Tried = list[tuple[float, float]]
@@ -250,6 +253,7 @@ def brittle(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[Increment, T
             return Equilibrium(start, none, none, 0.0, 0.0, 5, np.zeros((6, 4)))
 
         monkeypatch.setattr(increment, "relax", relax)
+        monkeypatch.setattr(increment, "check_sides", lambda *_: None)
         design, mesh = small_cell((1,))
         start = Configuration(np.ones((1, 3, 3)))
         return advance(mesh, design, start, REST, np.diag([2.0, 1.0]), say=said.append), tried, said

@@ -77,8 +77,8 @@ def test_a_design_without_probes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("design", "Ry", "Rc", "warning"),
     [
-        (with_an_insulating_yarn, np.inf, np.nan, "the yarns do not conduct"),
-        (of_insulating_yarns, np.inf, np.nan, "the yarns do not conduct"),
+        (with_an_insulating_yarn, np.nan, np.nan, "the probe currents say nothing"),
+        (of_insulating_yarns, np.nan, np.nan, "no yarn conducts"),
         (without_contact_conduction, np.nan, np.inf, "the crossings do not conduct"),
     ],
 )

@@ -23,7 +23,8 @@ CROWD = 4000
 def crowd(warp: int, weft: int) -> Weave:
     """A weave whose only use is its many fibrils."""
     one = plain_weave(yarns=1, rows=(1,)).weave
-    yarn = replace(one.warp[0], rows=(CROWD // warp,), materials=one.warp[0].materials * (CROWD // warp))
+    few = PITCH / CROWD  # so close that they have room
+    yarn = replace(one.warp[0], rows=(CROWD // warp,), spacing=few, materials=one.warp[0].materials * (CROWD // warp))
     return Weave(((1,) * weft,) * warp, (yarn,) * warp, (yarn,) * weft, PITCH, H)
 
 

@@ -14,9 +14,9 @@ from circuittex.study.plan import plan, state_names
     "loading",
     [
         (shear("a", (1.0, 1.0)), shear("a-1", (2.0,))),  # a-1-2 twice
-        (shear("a-", (5.0,)), shear("a", (-5.0,))),  # a--5 twice
+        (shear("a-", (4.0,)), shear("a", (-4.0,))),  # a--4 twice
         (shear("a", (0.05, -0.05)),),  # signs are no letters in a netlist
-        (shear("a_0", (5.0,)), shear("a-0", (5.0,))),
+        (shear("a_0", (4.0,)), shear("a-0", (4.0,))),
         (shear("a", (1.0, 1.0 + 1e-12, 1.0)),),  # equal to the digits shown
     ],
 )

@@ -107,7 +107,7 @@ def test_agreement_and_its_lack_are_said_plainly() -> None:
 
 
 def test_the_verdict_names_the_states_that_disagree() -> None:
-    text = page(disagreeing(STUDY, "stretch-0.0250", reduced_difference=3e-8), {})
+    text = page(disagreeing(STUDY, "stretch-0.0250", max_voltage_difference=3e-8), {})
     assert "The routes DISAGREE in stretch-0.0250, by up to 3.0e-08" in text
     assert "ngspice confirmed" not in text
     assert text.count("NOT CONFIRMED") == 1

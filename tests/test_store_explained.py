@@ -27,7 +27,8 @@ PURE = {
     *("ContactState.axial_factor", "FibrilMesh.directors", "FibrilMesh.poisson_ratio", "Material.poisson_ratio"),
     *("Verification.max_current_difference", "Verification.merge_error", "Verification.field_difference"),
     *("Verification.native_difference", "Verification.ngspice_limit"),  # V per V, or relative
-    *("Numerics.drop_fraction", "Numerics.tolerance"),
+    *("Verification.native_limit", "Fit.pair_errors", "Numerics.drop_fraction", "Numerics.tolerance"),
+    *("Numerics.overlap_warning", "Numerics.overlap_limit"),
 }
 """Every field with pure numbers that are no counts. A field that is not here names its unit in the text below it."""
 

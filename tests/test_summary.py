@@ -43,7 +43,7 @@ def unchecked(study: Study, *names: str) -> Study:
 
 def test_keys_that_the_documentation_promises(tmp_path: Path) -> None:
     content = written(STUDY, tmp_path)
-    assert content["format"] == 1
+    assert content["format"] == 2
     assert content["design_hash"] == STUDY.design_hash
     assert content["parameters"]["weave"]["pitch"] == 2.0
     assert len(content["states"]) == 3
@@ -140,7 +140,6 @@ def disagreeing(study: Study, name: str, **values: float) -> Study:
         {"max_voltage_difference": 3e-8},
         {"max_current_difference": 3e-8},
         {"native_difference": 3e-8, "max_current_difference": 3e-8, "ngspice_limit": 1e-6},
-        {"reduced_difference": 3e-8},
     ],
 )
 def test_routes_that_disagree_are_not_called_confirmed(values: dict[str, float], tmp_path: Path) -> None:

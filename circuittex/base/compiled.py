@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import os
-import stat
 import sys
-import tempfile
 import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
-from pathlib import Path
 from typing import Any, TypeVar
 
 from numba import config, njit
 
 from circuittex.base.errors import CircuittexWarning
+from circuittex.base.private import private_folder
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -31,32 +29,25 @@ def compiled(function: F) -> F:
     try:
         kernel: F = njit(cache=True, **options)(function)
     except RuntimeError:  # numba: no place to keep it, neither beside the file nor in the user's cache
-        kept = _private_cache()
-        kernel = njit(cache=kept, **options)(function)
+        kernel = njit(cache=_kept_elsewhere(), **options)(function)
     return kernel
 
 
 @cache
-def _private_cache() -> bool:
-    """Have numba keep compiled functions in a folder of this user among the temporary files; False if that fails."""
-    folder = Path(tempfile.gettempdir(), f"circuittex-{os.getuid() if hasattr(os, 'getuid') else 'compiled'}")
-    try:
-        folder.mkdir(mode=0o700, exist_ok=True)
-        status = folder.lstat()
-        # What is loaded from there is run: it must be nobody else's.
-        own = stat.S_ISDIR(status.st_mode) and not status.st_mode & 0o022 and os.access(folder, os.W_OK)
-        own = own and (not hasattr(os, "getuid") or status.st_uid == os.getuid())
-    except OSError:
-        own = False
-    where = f"kept in {folder}" if own else "compiled anew in every process"
+def _kept_elsewhere() -> bool:
+    """Have numba keep compiled functions in the private folder; False where there is none."""
+    folder = private_folder()
+    where = f"kept in {folder}" if folder else "compiled anew in every process"
     warnings.warn(
         f"neither the installation nor the home folder can be written to: compiled functions are {where}",
         CircuittexWarning,
         stacklevel=3,
     )
-    if own:
-        config.CACHE_DIR = str(folder)
-    return own
+    if folder is None:
+        return False
+    config.CACHE_DIR = str(folder)
+    os.environ["NUMBA_CACHE_DIR"] = str(folder)  # processes that this one starts need not find out for themselves
+    return True
 
 
 def available_cores() -> int:

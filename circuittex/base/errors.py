@@ -32,6 +32,10 @@ class ConvergenceError(CircuittexError, RuntimeError):
         super().__init__(message)
 
 
+class PenetrationError(ConvergenceError):
+    """Fibrils that contact does not keep apart: through one another, or too deep for its law to mean anything."""
+
+
 class CircuitError(CircuittexError, ValueError):
     """A circuit that has no unique solution or cannot be written."""
 

@@ -18,12 +18,13 @@ import sys
 import threading
 import time
 import traceback
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, BinaryIO, Protocol
 
-from circuittex.base.errors import CircuittexError, WorkerError
+from circuittex.base.errors import CircuittexError, CircuittexWarning, WorkerError
 
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 """Environment variables by which the libraries below NumPy, PARDISO and numba learn how many threads to start."""
@@ -186,6 +187,7 @@ def serve() -> None:
     """The life of a worker: compute what comes through standard input, answer through standard output."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a library prints is no answer
+    warnings.simplefilter("ignore", CircuittexWarning)  # it has been said by the process that started this one
     tasks: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     threading.Thread(target=_receive, args=(sys.stdin.buffer, tasks), daemon=True).start()
     try:

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 
 from circuittex.base.errors import CircuittexError, ConvergenceError, DesignError, StoreError
 from circuittex.command.exit_codes import ExitCode, code_of
+from circuittex.command.figures import plain_figures
 from circuittex.command.options import build_parser
 from circuittex.command.progress import Progress
-from circuittex.command.streams import show_notes, usable_streams, write_utf8
+from circuittex.command.streams import complain, show_notes, usable_streams, write_utf8
 
 if TYPE_CHECKING:
     from circuittex.design import Design, Probe
@@ -40,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _exit_code(arguments: Sequence[str] | None) -> ExitCode:
     usable_streams()
     show_notes()
-    os.environ["MPLBACKEND"] = "agg"  # figures are files: that of a notebook may not be installed here
+    plain_figures()
     options = build_parser().parse_args(arguments)
     try:
         code = COMMANDS[options.command](options)
@@ -50,25 +51,20 @@ def _exit_code(arguments: Sequence[str] | None) -> ExitCode:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ExitCode.BROKEN_PIPE
     except (CircuittexError, OSError) as error:
-        _complain("error", str(error))
+        complain("error", str(error))
         return code_of(error)
     except KeyboardInterrupt:
-        print(f"\ncircuittex: interrupted; {_kept(options)}", file=sys.stderr)
+        print(f"\ncircuittex: interrupted; {_kept(options)}", file=sys.stderr)  # below the ^C of the terminal
         return ExitCode.INTERRUPTED
     except Exception as error:
         if os.environ.get(DEBUG):
             raise
-        _complain(
+        complain(
             "internal error",
             f"{type(error).__name__}: {error}; this is a fault of circuittex: please report what {DEBUG}=1 shows",
         )
         return ExitCode.INTERNAL
     return code
-
-
-def _complain(kind: str, text: str) -> None:
-    """One line on the standard error."""
-    print(f"circuittex: {kind}:", " ".join(text.split()), file=sys.stderr)
 
 
 def _new(options: argparse.Namespace) -> ExitCode:
@@ -101,7 +97,7 @@ def _run(options: argparse.Namespace) -> ExitCode:
         except ConvergenceError as error:
             if not _count(options.out):
                 raise
-            _complain("error", f"{error}; {_kept(options)}")
+            complain("error", f"{error}; {_kept(options)}")
             return ExitCode.PARTLY
     if not options.quiet:
         print(table(study))
@@ -110,18 +106,15 @@ def _run(options: argparse.Namespace) -> ExitCode:
         print(f"circuittex: the routes DISAGREE in {', '.join(names)}: do not trust these results", file=sys.stderr)
         return ExitCode.DISAGREE
     if failed := _simulator_failed(study):
-        print(f"circuittex: ngspice failed in {', '.join(failed)}: see the report", file=sys.stderr)
+        again = f"'circuittex verify {options.out}' asks it again"
+        print(f"circuittex: ngspice failed in {', '.join(failed)}: see the report; {again}", file=sys.stderr)
         return ExitCode.SIMULATOR
     return ExitCode.DONE
 
 
 def _simulator_failed(study: Study) -> list[str]:
-    """Names of the states on which an ngspice that is there gave no answer."""
-    from circuittex.electrical.spice.ngspice import find_ngspice
-
-    if find_ngspice() is None:
-        return []
-    return [r.name for r in study.records if r.verification.routes and r.verification.simulator_failed]
+    """Names of the states on which an ngspice that was there gave no answer."""
+    return [record.name for record in study.records if record.verification.simulator_failed]
 
 
 def _disagreeing(study: Study) -> list[str]:
@@ -197,13 +190,11 @@ def _verify(options: argparse.Namespace) -> ExitCode:
 
 def _verdict(checks: Sequence[Verification]) -> ExitCode:
     """What the checks of all states say together, the worst first."""
-    from circuittex.electrical.spice.ngspice import find_ngspice
-
     if any(check.routes and not check.agrees for check in checks):
         return ExitCode.DISAGREE
-    if all(check.ngspice_checked for check in checks):
-        return ExitCode.DONE
-    return ExitCode.NOT_CHECKED if find_ngspice() is None else ExitCode.SIMULATOR
+    if any(check.simulator_failed for check in checks):
+        return ExitCode.SIMULATOR
+    return ExitCode.DONE if all(check.ngspice_checked for check in checks) else ExitCode.NOT_CHECKED
 
 
 def _report(options: argparse.Namespace) -> ExitCode:
@@ -247,11 +238,11 @@ def _ensemble(options: argparse.Namespace) -> ExitCode:
         print("circuittex:", line, file=sys.stderr)
     if any(ensemble.disagreeing):
         return ExitCode.DISAGREE
-    failed = sum(map(bool, ensemble.failures))
-    if failed == len(ensemble.failures):
-        _complain("error", f"all {failed} members failed")
-        return ExitCode.NO_EQUILIBRIUM
-    return ExitCode.PARTLY if failed else ExitCode.DONE
+    if not any(ensemble.failures):
+        return ExitCode.DONE
+    if all(ensemble.failures):
+        complain("error", f"all {len(ensemble.failures)} members failed")
+    return ExitCode.PARTLY if ensemble.count.any() else ExitCode.NO_EQUILIBRIUM
 
 
 COMMANDS: dict[str, Callable[[argparse.Namespace], ExitCode]] = {

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from circuittex.base.errors import CircuittexError, ConvergenceError, DesignError, NgspiceError
+from circuittex.base.errors import (
+    CircuitError,
+    CircuittexError,
+    ConvergenceError,
+    DesignError,
+    FolderError,
+    NgspiceError,
+    NgspiceUnavailableError,
+    StoreError,
+    WorkerError,
+)
 
 
 class ExitCode(IntEnum):
@@ -33,12 +43,26 @@ MEANINGS: dict[ExitCode, str] = {
     ExitCode.DISAGREE: "the routes to the currents disagree: do not trust the results",
     ExitCode.PARTLY: "some states or members failed; the others are kept",
     ExitCode.FILES: "a folder, a file or a worker process cannot be used",
-    ExitCode.NOT_CHECKED: "'verify': there is no ngspice to check with",
+    ExitCode.NOT_CHECKED: "'verify': ngspice was not asked: none is there, the circuit is too large, or no probe",
     ExitCode.SIMULATOR: "ngspice is there but failed on a state",
     ExitCode.INTERRUPTED: "interrupted (Ctrl-C)",
     ExitCode.BROKEN_PIPE: "the reader of the output has gone",
 }
 """Every code in words, for the help and the documentation."""
+
+
+OF_ERRORS: tuple[tuple[type[CircuittexError | OSError], ExitCode], ...] = (
+    (DesignError, ExitCode.DESIGN),
+    (CircuitError, ExitCode.DESIGN),
+    (ConvergenceError, ExitCode.NO_EQUILIBRIUM),
+    (NgspiceUnavailableError, ExitCode.NOT_CHECKED),
+    (NgspiceError, ExitCode.SIMULATOR),
+    (StoreError, ExitCode.FILES),
+    (FolderError, ExitCode.FILES),
+    (WorkerError, ExitCode.FILES),
+    (OSError, ExitCode.FILES),
+)
+"""The code of every error that ends a command, and of those derived from it; the first that fits."""
 
 
 def code_of(error: CircuittexError | OSError) -> ExitCode:
@@ -47,11 +71,7 @@ def code_of(error: CircuittexError | OSError) -> ExitCode:
     >>> code_of(DesignError("weave.pitch", -1.0, "it must be > 0 mm")).name
     'DESIGN'
     """
-    kinds = ((DesignError, ExitCode.DESIGN), (ConvergenceError, ExitCode.NO_EQUILIBRIUM))
-    for kind, code in (*kinds, (NgspiceError, ExitCode.SIMULATOR)):
-        if isinstance(error, kind):
-            return code
-    return ExitCode.FILES
+    return next((code for kind, code in OF_ERRORS if isinstance(error, kind)), ExitCode.INTERNAL)
 
 
 def table() -> str:

@@ -10,6 +10,15 @@ from typing import TextIO
 
 from circuittex.base.errors import CircuittexWarning
 
+CLEAR = "\r\x1b[2K"
+"""Has a terminal begin its line anew."""
+
+
+def complain(kind: str, text: str) -> None:
+    """One line on the standard error, in place of what a terminal shows of the work."""
+    start = CLEAR if sys.stderr.isatty() else ""
+    print(f"{start}circuittex: {kind}:", " ".join(text.split()), file=sys.stderr)
+
 
 def usable_streams() -> None:
     """Give closed standard streams the null device, and let no character be one that a stream cannot write.
@@ -54,7 +63,7 @@ def show_notes() -> None:
         line: str | None = None,
     ) -> None:
         if issubclass(category, CircuittexWarning):
-            print(f"circuittex: note: {message}", file=sys.stderr)
+            complain("note", str(message))
         else:
             usual(message, category, filename, lineno, file, line)
 

@@ -14,6 +14,16 @@ def effective_modulus(e1: Floats, nu1: Floats, e2: Floats, nu2: Floats) -> Float
     return 1 / ((1 - nu1**2) / e1 + (1 - nu2**2) / e2)
 
 
+def hertz_penalty(modulus: Floats) -> Floats:
+    """P* = E*/2, N/mm2.
+
+    A line load P* o on either of two crossing cylinders of equal radius R, integrated over the crossing, is
+    8/3 P* sqrt(R) o^(3/2), and Hertz's point contact has 4/3 E* sqrt(R) o^(3/2) (Johnson, Contact Mechanics, 1985,
+    section 4.2).
+    """
+    return modulus / 2
+
+
 def effective_radius(r1: Floats, r2: Floats) -> Floats:
     """R*, mm: 1/R* = 1/R1 + 1/R2."""
     return 1 / (1 / r1 + 1 / r2)
@@ -33,15 +43,10 @@ def hertz_width(line_load: Floats, radius: Floats, modulus: Floats) -> Floats:
 
 
 def pair_penalty(mesh: FibrilMesh, law: ContactLaw, a: Ints, b: Ints) -> Floats:
-    """P* (C,), N/mm2, of contacts between the fibrils a and b (C,).
-
-    'hertz' is P* = E*/2: a line load P* o on either of two crossing cylinders of equal radius R, integrated over the
-    crossing, is 8/3 P* sqrt(R) o^(3/2), and Hertz's point contact has 4/3 E* sqrt(R) o^(3/2) (Johnson, Contact
-    Mechanics, 1985, section 4.2).
-    """
+    """P* (C,), N/mm2, of contacts between the fibrils a and b (C,); 'hertz' is that of `hertz_penalty`."""
     stated = _of_pairs(mesh, law, "penalty", a, b)
     e, nu = mesh.youngs_modulus, mesh.poisson_ratio
-    return np.where(np.isnan(stated), effective_modulus(e[a], nu[a], e[b], nu[b]) / 2, stated)
+    return np.where(np.isnan(stated), hertz_penalty(effective_modulus(e[a], nu[a], e[b], nu[b])), stated)
 
 
 def largest_penalty(mesh: FibrilMesh, law: ContactLaw) -> Floats:

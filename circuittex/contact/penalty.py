@@ -8,14 +8,16 @@ import numpy as np
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import cores, side_by_side
+from circuittex.base.errors import PenetrationError
 from circuittex.base.frozen import frozen
 from circuittex.contact.closest import find_contacts
 from circuittex.contact.curve import BASIS, CurveTable, bezier, curve_table
 from circuittex.contact.kernels import add_contacts
 from circuittex.contact.law import pair_penalty
+from circuittex.contact.passing import PRESSED, likely_cause, safe_step
 from circuittex.contact.search import CONTROL_MOTION, Candidates, coupled_nodes, find_candidates
 from circuittex.design import ContactLaw
-from circuittex.geometry.mesh import FibrilMesh
+from circuittex.geometry.mesh import FibrilMesh, pair_label
 from circuittex.mech.pattern import Pattern
 
 WORTH_A_THREAD = 2000
@@ -120,6 +122,18 @@ class PenaltyContact:
         """(C,) P* w of each contact point, N/mm."""
         a = self.table.fibril[found.interval_a]
         return np.asarray(pair_penalty(self.mesh, self.law, a, found.fibril_b) * self.weight[a])
+
+    def longest(self, q: Floats, direction: Floats) -> float:
+        """The part of `direction` that the centre lines can go without colliding (`safe_step`).
+
+        Raises `PenetrationError` where a pair that limits it is pressed together as if there were no contact.
+        """
+        mesh = self.mesh
+        step = safe_step(self.table, mesh.radius, self.positions(q), self.positions(direction))
+        if step.part < 1.0 and step.distance < PRESSED * mesh.radius[list(step.fibrils)].sum():
+            what = f"{pair_label(mesh, *step.fibrils)} are pressed through one another"
+            raise PenetrationError(f"{what}; {likely_cause(mesh, self.law, *step.fibrils)}")
+        return step.part
 
     def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
         """Add gradient and tangent in place, the turning of the contact force to `softening`; return the energy."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from math import inf
+from math import hypot, inf
 
 from circuittex.base.frozen import frozen
 from circuittex.design.checks import name, one_of, real, refuse, store
@@ -12,6 +12,10 @@ from circuittex.design.checks import name, one_of, real, refuse, store
 Gradient = tuple[tuple[float, float], tuple[float, float]]
 """In-plane deformation gradient ((Fxx, Fxy), (Fyx, Fyy))."""
 REST: Gradient = ((1.0, 0.0), (0.0, 1.0))
+LEAST_STRETCH, MOST_STRETCH = 0.1, 5.0
+"""Principal stretches of the cell: no fabric is stretched or crushed further, and no model of one would hold."""
+HIGHEST_VOLTAGE = 1e5
+"""V: in air, sparks leap over a cell long before."""
 
 
 @frozen
@@ -123,6 +127,12 @@ def check_gradient(gradient: object, field: str) -> Gradient:
     (xx, xy), (yx, yy) = (tuple(real(v, f"{field}[{i}]") for v in row) for i, row in enumerate(gradient))
     if not 0.0 < xx * yy - xy * yx < inf:
         raise refuse(field, gradient, "its determinant must be > 0 (no area may vanish or turn over)")
+    # Sum and difference of the two principal stretches.
+    both, apart = hypot(xx + yy, xy - yx), hypot(xx - yy, xy + yx)
+    least, most = (both - apart) / 2.0, (both + apart) / 2.0
+    if least < LEAST_STRETCH or most > MOST_STRETCH:
+        allowed = f"it stretches the cell by factors of {least:.3g} and {most:.3g}"
+        raise refuse(field, gradient, f"{allowed}; from {LEAST_STRETCH:g} to {MOST_STRETCH:g} are allowed")
     return (xx, xy), (yx, yy)
 
 
@@ -173,7 +183,9 @@ class Probe:
 
     def __post_init__(self) -> None:
         at = f"probes.{name(self.name, 'probes.name')}"
-        store(self, voltage=real(self.voltage, f"{at}.voltage", "V"))
+        store(
+            self, voltage=real(self.voltage, f"{at}.voltage", "V", at_least=-HIGHEST_VOLTAGE, at_most=HIGHEST_VOLTAGE)
+        )
         if self.voltage == 0.0:
             raise refuse(f"{at}.voltage", self.voltage, "it must not be 0 V, or no current flows")
         if self.source == self.sink:

@@ -11,6 +11,11 @@ from circuittex.design.declaration import check, number
 
 MOST_FIBRILS = 10_000
 """Fibrils of one yarn."""
+MOST_OPEN = 1e5
+"""Pitch over the smallest radius: the most open scrims of the thinnest fibrils have some 1e4."""
+STIFFEST, HEAVIEST, MOST_CONDUCTIVE, THICKEST = 1e9, 1e6, 1e9, 1e4
+"""MPa, g/mm3, S/mm and W/(mm K), mm: a thousand times and more beyond diamond, osmium, silver and a ship's rope, which
+leaves room for designs in units of another scale and none for slips of the pen."""
 
 
 @frozen
@@ -25,19 +30,27 @@ class Material:
     """What it is called."""
     youngs_modulus: float = field(
         metadata=number(
-            "MPa", "E > 0; the paper's Table I prints 1.26 MPa, its code used 10 MPa", shown="10 MPa", above=0
+            "MPa",
+            "E > 0; the paper's Table I prints 1.26 MPa, its code used 10 MPa",
+            shown="10 MPa",
+            above=0,
+            at_most=STIFFEST,
         )
     )
     """E, MPa."""
     poisson_ratio: float = field(metadata=number("1", "nu, 0 to 0.45", shown="0.0", at_least=0, at_most=0.45))
     """nu, from 0 to 0.45."""
-    density: float = field(metadata=number("g/mm3", "rho > 0", shown="1 g/mm3", above=0))
+    density: float = field(metadata=number("g/mm3", "rho > 0", shown="1 g/mm3", above=0, at_most=HEAVIEST))
     """rho, g/mm3."""
     electrical_conductivity: float = field(
-        metadata=number("S/mm", "sigma >= 0; 0 makes an insulating fibril", shown="10 S/mm", at_least=0)
+        metadata=number(
+            "S/mm", "sigma >= 0; 0 makes an insulating fibril", shown="10 S/mm", at_least=0, at_most=MOST_CONDUCTIVE
+        )
     )
     """sigma, S/mm; 0 for an insulator."""
-    thermal_conductivity: float = field(metadata=number("W/(mm K)", "k > 0", shown="1 W/(mm K)", above=0))
+    thermal_conductivity: float = field(
+        metadata=number("W/(mm K)", "k > 0", shown="1 W/(mm K)", above=0, at_most=MOST_CONDUCTIVE)
+    )
     """k, W/(mm K)."""
 
     def __post_init__(self) -> None:
@@ -59,7 +72,7 @@ class Yarn:
     """What it is called."""
     rows: tuple[int, ...]
     """Fibrils in each row."""
-    radius: float = field(metadata=number("mm", "of every fibril", shown="0.15 mm", above=0))
+    radius: float = field(metadata=number("mm", "of every fibril", shown="0.15 mm", above=0, at_most=THICKEST))
     """R of every fibril, mm."""
     spacing: float = field(metadata=number("mm", "between the axes of neighbours in a row", shown="0.3 mm", above=0))
     """Distance of neighbours within a row, mm."""
@@ -140,7 +153,27 @@ class Weave:
                 raise refuse(
                     f"weave.{which}", len(getattr(self, which)), f"the draft needs {wanted} yarns, one for each {side}"
                 )
+        self._check_proportions()
         self._check_curvature()
+
+    def _check_proportions(self) -> None:
+        # Lengths against one another, so that a design of any size is judged alike.
+        for yarn in self.yarns:
+            at = f"yarns.{yarn.name}"
+            for key in ("spacing", "row_spacing"):
+                if getattr(yarn, key) > self.pitch:
+                    allowed = f"it must be at most the pitch of the weave, {self.pitch:g} mm"
+                    raise refuse(f"{at}.{key}", getattr(yarn, key), allowed)
+            if (max(yarn.rows) - 1) * yarn.spacing > self.pitch:
+                allowed = f"a row of {max(yarn.rows)} fibrils must not be wider than the pitch, {self.pitch:g} mm"
+                raise refuse(f"{at}.spacing", yarn.spacing, allowed)
+        if self.amplitude > self.pitch:
+            allowed = f"it must be at most the pitch, {self.pitch:g} mm: no yarn is as steep"
+            raise refuse("weave.amplitude", self.amplitude, allowed)
+        radius = min(yarn.radius for yarn in self.yarns)
+        if self.pitch > MOST_OPEN * radius:
+            allowed = f"it must be at most {MOST_OPEN * radius:g} mm, {MOST_OPEN:g} of the smallest radii"
+            raise refuse("weave.pitch", self.pitch, allowed)
 
     def _check_curvature(self) -> None:
         # The section at a crest turns inside out where R >= radius of curvature = pitch^2 / (pi^2 H).

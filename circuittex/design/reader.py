@@ -10,6 +10,7 @@ from typing import TypeVar
 from circuittex.design.checks import is_name, name, one_of, real, refuse, truth, whole
 from circuittex.design.declaration import keys, read
 from circuittex.design.experiment import (
+    MOST_STRETCH,
     Gradient,
     Loading,
     Probe,
@@ -184,7 +185,8 @@ def _loading(value: object, path: str) -> Loading:
 
 
 def _stepped(table: Table, label: str, kind: str, free: str) -> Loading:
-    strains = _strains(table, above=-inf if kind == "shear" else -1.0)
+    shears = kind == "shear"
+    strains = _strains(table, above=-inf if shears else -1.0, at_least=1.0 - MOST_STRETCH if shears else -inf)
     if kind == "uniaxial":
         axis = one_of(table.value.get("axis", "x"), table.at("axis"), ("x", "y"))
         return uniaxial(label, strains, axis, free)
@@ -206,8 +208,12 @@ def _size(gradient: Gradient) -> float:
     return (hypot(a + d, b - c) + hypot(a - d, b + c)) / 2.0
 
 
-def _strains(table: Table, above: float) -> tuple[float, ...]:
+def _strains(table: Table, above: float, at_least: float) -> tuple[float, ...]:
     """Either `strains` as listed, or `steps` equal ones up to `strain`."""
+
+    def checked(strain: float, field: str) -> float:
+        return real(strain, field, above=above, at_least=at_least, at_most=MOST_STRETCH - 1.0)
+
     if table.has("strains"):
         for key in ("strain", "steps"):
             if table.has(key):
@@ -215,8 +221,8 @@ def _strains(table: Table, above: float) -> tuple[float, ...]:
         listed = _numbers(table, "strains")
         if not listed:
             raise refuse(table.at("strains"), [], "at least one strain is needed")
-        return tuple(real(e, f"{table.at('strains')}[{i}]", above=above) for i, e in enumerate(listed))
-    strain = real(table.number("strain", "1"), table.at("strain"), above=above)
+        return tuple(checked(e, f"{table.at('strains')}[{i}]") for i, e in enumerate(listed))
+    strain = checked(table.number("strain", "1"), table.at("strain"))
     if strain == 0.0:
         raise refuse(table.at("strain"), strain, "it must not be 0; the relaxed state is recorded anyway")
     steps = table.get("steps", "a whole number of equal steps")

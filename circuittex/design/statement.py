@@ -46,6 +46,19 @@ class Electrical:
     )
     """Whether the Joule heat of the contacts warms the fibrils, half to each side."""
 
+    fit: str = field(
+        default="auto",
+        metadata=choice(
+            'what the reduced network is fitted to. "all-pairs": the resistances between all yarn ends, with one for '
+            'each crossing; "probes": the probe currents, one Ry and one Rc (the paper\'s fit); "auto": the probes '
+            "where all yarns are of one kind, else all pairs",
+            ("auto", "probes", "all-pairs"),
+            shown="all-pairs",
+        ),
+    )
+    """'auto' or 'probes': Ry and Rc are fitted to the probe currents, one of each (the paper's fit [47]); 'all-pairs',
+    or 'auto' where yarns of several kinds conduct: to the resistances between all yarn ends, crossing by crossing."""
+
     def __post_init__(self) -> None:
         check(self, "electrical")
 
@@ -85,6 +98,25 @@ class Numerics:
         metadata=count("Newton iterations before a relaxation is given up or its step halved", 1, 100_000, shown="200"),
     )
     """Newton iterations before a relaxation is given up; an increment of a loading path is then made in halves."""
+    overlap_warning: float = field(
+        default=0.3,
+        metadata=number(
+            "1",
+            "overlap of two fibrils over R + R' from which on a state comes with a warning",
+            shown="0.3",
+            above=0,
+            at_most=1,
+        ),
+    )
+    """Overlap of two fibrils over R + R' from which on a state comes with a warning: the law of contact is for small
+    ones."""
+    overlap_limit: float = field(
+        default=0.5,
+        metadata=number(
+            "1", "the same from which on a state is not recorded but an error", shown="0.5", above=0, at_most=1
+        ),
+    )
+    """Overlap over R + R' from which on a state is not recorded: the law of contact means nothing there."""
     merge_length: float | str = field(
         default=AUTO,
         metadata=number(

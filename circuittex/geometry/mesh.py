@@ -92,3 +92,12 @@ class FibrilMesh:
     def ends(self) -> Ints:
         """(2F,) nodes of all fibril ends, where the clamps are: the minus ends, then the plus ends."""
         return np.concatenate([self.end_nodes(-1), self.end_nodes(+1)])
+
+
+def pair_label(mesh: FibrilMesh, first: int, second: int) -> str:
+    """Two fibrils in words, counted from 1: 'fibril 2 of warp1 and fibril 1 of weft2', for example."""
+    labels = []
+    for fibril in (first, second):
+        number = int(np.count_nonzero(mesh.yarn[: fibril + 1] == mesh.yarn[fibril]))
+        labels.append(f"fibril {number} of {mesh.yarn_names[mesh.yarn[fibril]]}")
+    return " and ".join(labels)

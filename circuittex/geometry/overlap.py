@@ -1,4 +1,4 @@
-"""How far fibrils start inside one another, and the refusal of designs where they do so too far."""
+"""How far fibrils start inside one another and in which order, and the refusal of designs where either is not right."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ from scipy.spatial import cKDTree
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.errors import DesignError
-from circuittex.design import Weave
+from circuittex.design import Weave, Yarn
 from circuittex.design.packing import Packing
-from circuittex.geometry.centre_lines import centre_lines
+from circuittex.geometry.centre_lines import CentreLines, centre_lines
+from circuittex.geometry.crossings import Lines, against_draft, woven
 
 _SAMPLES = 16  # chords a crossing; in the paper's cell they leave the curve by 0.003 mm at the most
 _CHUNK = 50_000  # chords searched at a time, which bounds the memory
+_COUNTED = "(counted from 1, the lowest row first)"
 _SLACK = 1e-5  # of the smallest radius: a start of exactly one radius is allowed whatever the rounding
 
 
@@ -30,7 +32,7 @@ def check_overlaps(weave: Weave, packing: Packing = Packing()) -> None:  # noqa:
     """
     if not packing.regular:
         check_overlaps(weave)
-    lines = centre_lines(weave, _SAMPLES * max(len(weave.warp), len(weave.weft)) + 1, packing)
+    lines = _sampled(weave, packing)
     radius = np.array([kind.radius for kind in weave.yarns])[lines.yarn]
     deepest, pair = 0.0, (0, 0)
     for first, second, distance in near_pairs(lines.position, float(radius.max())):
@@ -41,6 +43,32 @@ def check_overlaps(weave: Weave, packing: Packing = Packing()) -> None:  # noqa:
             deepest, pair = float(excess[worst]), (int(first[worst]), int(second[worst]))
     if deepest > _SLACK * float(radius.min()):
         raise _refusal(weave, packing, lines.yarn, min(pair), max(pair), deepest)
+
+
+def check_order(weave: Weave, packing: Packing = Packing()) -> None:  # noqa: B008 (frozen)
+    """Refuse a weave in which a warp and a weft fibril start on the wrong side of one another.
+
+    Yarns of several rows can start so without being deep inside one another, row between row. The `DesignError` is
+    about the amplitude, or about the seed of the `packing` where the regular one is in order.
+
+    >>> from circuittex.design import plain_weave
+    >>> check_order(plain_weave(yarns=2).weave)
+    """
+    if not packing.regular:
+        check_order(weave)
+    lines = _sampled(weave, packing)
+    n, samples = lines.position.shape[:2]
+    axis = (lines.yarn >= len(weave.warp)).astype(np.int64)
+    found = woven(Lines(lines.position.reshape(-1, 3), samples * np.arange(n + 1), axis))
+    pairs, _ = against_draft(found, np.array(weave.draft), lines.yarn)
+    if not len(pairs):
+        return
+    labels = [_label(weave, lines.yarn, fibril)[0] for fibril in pairs[0].tolist()]
+    wrong = f"{labels[0]} and {labels[1]} {_COUNTED} start on the wrong side of one another"
+    if not packing.regular:
+        raise DesignError("packing.seed", packing.seed, wrong)
+    least = max(map(_height, weave.warp)) / 4 + max(map(_height, weave.weft)) / 4
+    raise DesignError("weave.amplitude", weave.amplitude, f"{wrong}; above {least:.4g} mm their rows are apart")
 
 
 def segment_distance(p: Floats, q: Floats, r: Floats, s: Floats) -> Floats:
@@ -93,12 +121,24 @@ def _dot(a: Floats, b: Floats) -> Floats:
     return np.asarray(np.einsum("ij,ij->i", a, b), dtype=np.float64)
 
 
+def _sampled(weave: Weave, packing: Packing) -> CentreLines:
+    return centre_lines(weave, _SAMPLES * max(len(weave.warp), len(weave.weft)) + 1, packing)
+
+
+def _height(yarn: Yarn) -> float:
+    """Distance of the highest row from the lowest, mm."""
+    return (len(yarn.rows) - 1) * yarn.row_spacing
+
+
+def _label(weave: Weave, yarn: Ints, fibril: int) -> tuple[str, int]:
+    """What a fibril is called, and its number in its yarn, from 0."""
+    place = fibril - int(np.searchsorted(yarn, yarn[fibril]))
+    return f"fibril {place + 1} of {weave.yarn_names[yarn[fibril]]}", place
+
+
 def _refusal(weave: Weave, packing: Packing, yarn: Ints, f: int, g: int, excess: float) -> DesignError:
     """The error for fibrils f < g: its field is the key that holds the two apart."""
-    labels, places = [], []
-    for fibril in (f, g):
-        places.append(fibril - int(np.searchsorted(yarn, yarn[fibril])))
-        labels.append(f"fibril {places[-1] + 1} of {weave.yarn_names[yarn[fibril]]}")
+    labels, places = zip(*(_label(weave, yarn, fibril) for fibril in (f, g)), strict=True)
     first, second = weave.yarns[yarn[f]], weave.yarns[yarn[g]]
     allowed = min(first.radius, second.radius)
     field: str
@@ -117,6 +157,6 @@ def _refusal(weave: Weave, packing: Packing, yarn: Ints, f: int, g: int, excess:
     return DesignError(
         field,
         value,
-        f"{labels[0]} and {labels[1]} (counted from 1, the lowest row first) start {excess + allowed:.4g} mm "
+        f"{labels[0]} and {labels[1]} {_COUNTED} start {excess + allowed:.4g} mm "
         f"inside one another, at most {allowed:.4g} mm (the smaller radius) is allowed",
     )

@@ -8,7 +8,7 @@ from circuittex.design import Design, Material
 from circuittex.design.declaration import keys
 from circuittex.geometry.centre_lines import centre_lines
 from circuittex.geometry.mesh import FibrilMesh
-from circuittex.geometry.overlap import check_overlaps
+from circuittex.geometry.overlap import check_order, check_overlaps
 
 
 def build_mesh(design: Design) -> FibrilMesh:
@@ -17,7 +17,8 @@ def build_mesh(design: Design) -> FibrilMesh:
     Nodes are equally spaced in xi3; elements of order 2 have one in their middle. See `centre_lines` for
     where the fibrils run.
 
-    Raises `DesignError` where fibrils start more than the smaller radius inside one another.
+    Raises `DesignError` where fibrils start more than the smaller radius inside one another, or in another order
+    than the draft's.
 
     >>> from circuittex.design import plain_weave
     >>> mesh = build_mesh(plain_weave())
@@ -26,6 +27,7 @@ def build_mesh(design: Design) -> FibrilMesh:
     """
     weave, numerics = design.weave, design.numerics
     check_overlaps(weave, design.packing)
+    check_order(weave, design.packing)
     n_nodes = numerics.order * numerics.elements + 1
     lines = centre_lines(weave, n_nodes, design.packing)
     n_fibrils = len(lines.yarn)

@@ -111,6 +111,10 @@ class Beam:
         self._by_fibrils(beam_energy, *self._arguments(q, self.weight), energy)
         return float(energy.sum())
 
+    def longest(self, q: Floats, direction: Floats) -> float:
+        """1: what a fibril alone can do to itself, its energy sees."""
+        return 1.0
+
     def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
         """Add gradient and tangent in place, nothing to `softening`; return the energy."""
         energy = np.empty(len(self.nodes))

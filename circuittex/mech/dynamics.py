@@ -128,6 +128,10 @@ class Inertia:
         inertia, drag = self._forces(q)
         return float(0.5 * ((q - self._coast) @ inertia + (q - self._from) @ drag))
 
+    def longest(self, q: Floats, direction: Floats) -> float:
+        """1: inertia and damping bar no way."""
+        return 1.0
+
     def gradient(self, q: Floats) -> Floats:
         """(n_dofs,) what inertia and damping add to the static gradient, N."""
         inertia, drag = self._forces(q)

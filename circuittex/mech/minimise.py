@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import compiled
-from circuittex.base.errors import ConvergenceError
+from circuittex.base.errors import ConvergenceError, PenetrationError
 from circuittex.base.frozen import frozen
 from circuittex.mech.linear import LinearSolver, Solve
 from circuittex.mech.pattern import DOFS, Pattern, build_pattern, diagonal, multiply
@@ -141,6 +141,9 @@ class System:
     def energy(self, q: Floats) -> float:
         return sum(term.energy(q) for term in self.terms)
 
+    def longest(self, q: Floats, direction: Floats) -> float:
+        return min(term.longest(q, direction) for term in self.terms)
+
 
 @compiled
 def _shifted(data: Any, part: float, softening: Any, shift: float, metric: Any, scaling: Any, values: Any) -> None:
@@ -172,7 +175,8 @@ def minimise(
     other is 0.
 
     Raises `ConvergenceError`, with the history, where that is not met at a minimum in `max_iterations`: an
-    unconverged state is never returned.
+    unconverged state is never returned. `PenetrationError` where a term
+    cannot keep apart what it should.
     """
     system = System(terms, scales, fixed, len(q))
     if before is not None:
@@ -209,7 +213,10 @@ def minimise(
                 continue
         force = np.where(free, gradient, 0.0)
         direction = solve(-force)
-        step = _search(system, q, direction, energy, float(force @ direction))
+        try:
+            step = _search(system, q, direction, energy, float(force @ direction))
+        except PenetrationError as error:
+            raise PenetrationError(str(error), np.array(history)) from error
         if step == 0.0:
             shift = 16 * max(shift, FIRST_SHIFT)
             if shift > system.largest_shift:
@@ -228,8 +235,13 @@ def predict(system: System, solver: LinearSolver, q: Floats, moved: Floats) -> F
     """Where a minimum q (n_dofs,) goes to first order when its prescribed unknowns move to those of `moved`.
 
     With the tangent K at q and the free unknowns f, the minimum moves by dq with (K dq)_f = 0; this is solved for the
-    difference to `moved`, a first guess. `moved` itself is returned where its potential is the lower one.
+    difference to `moved`, a first guess. `moved` itself is returned where its potential is the lower one, or where the
+    way to the prediction is barred (`ForceTerm.longest`).
+
+    Raises `PenetrationError` where the way to `moved` is barred too.
     """
+    if system.longest(q, moved - q) < 1.0:
+        raise PenetrationError("the motion of the clamps would carry fibrils through one another")
     pattern, _, _ = system.assemble(q)
     force = multiply(pattern, system.data + system.softening, moved - q)
     force[system.fixed] = 0.0
@@ -237,7 +249,8 @@ def predict(system: System, solver: LinearSolver, q: Floats, moved: Floats) -> F
     if solve is None:
         return moved
     predicted = moved - solve(force)
-    return predicted if system.energy(predicted) < system.energy(moved) else moved
+    lower = system.energy(predicted) < system.energy(moved)
+    return predicted if lower and system.longest(q, predicted - q) == 1.0 else moved
 
 
 def _positive(
@@ -278,17 +291,20 @@ def _escape(
     for sense in (-1.0, 1.0):
         step = FIRST_ESCAPE
         while (trial := system.energy(q + sense * step * mode)) < lowest:
+            if system.longest(q, sense * step * mode) < 1.0:
+                break
             best, lowest = q + sense * step * mode, trial
             step *= 2
     return best
 
 
 def _search(system: System, q: Floats, direction: Floats, energy: float, slope: float) -> float:
-    """Step length in {1, 1/2, 1/4, ...} that lowers the potential enough; 0 if none does."""
-    step = 1.0
+    """Step length in {1, 1/2, 1/4, ...} that is safe and lowers the potential enough; 0 if none does."""
+    step, longest = 1.0, system.longest(q, direction)
     for _ in range(12):
-        trial = system.energy(q + step * direction)
-        if trial <= energy + ARMIJO * step * slope + ROUND_OFF * abs(energy):
-            return step
+        if step <= longest:
+            trial = system.energy(q + step * direction)
+            if trial <= energy + ARMIJO * step * slope + ROUND_OFF * abs(energy):
+                return step
         step /= 2
     return 0.0

@@ -15,6 +15,7 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.relaxation.relax import Equilibrium, move, relax
+from circuittex.relaxation.sides import check_sides
 
 SMALLEST = Fraction(1, 64)
 """Smallest part of an increment that is tried before the path is given up."""
@@ -46,10 +47,11 @@ def advance(
 ) -> Increment:
     """The equilibrium at the average deformation gradient `after` (2, 2), from the one `now` at `before`.
 
-    An increment that does not converge within the design's `max_iterations` is made in two halves, these in halves
-    again where they must be, down to `SMALLEST`; `say` is told. Between the ends the gradient is F = before +
-    t (after - before): a straight line, which for the small increments of a path differs little from any other.
-    The ends of yarns along `free`, 'x' or 'y', are not held (`relax`); `report` is told of every iteration.
+    An increment that does not converge within the design's `max_iterations`, or leads fibrils through one another or
+    round an end, is made in two halves, these in halves again where they must be, down to `SMALLEST`; `say` is told.
+    Between the ends the gradient is F = before + t (after - before): a straight line, which for the small increments
+    of a path differs little from any other. The ends of yarns along `free`, 'x' or 'y', are not held (`relax`);
+    `report` is told of every iteration.
 
     Raises `ConvergenceError`, with the history of the last try, where the smallest part does not converge.
     """
@@ -59,10 +61,11 @@ def advance(
         try:
             start = move(now, gradient, target)
             equilibrium = relax(mesh, design, start, before=now, free=free, solver=solver, report=report)
+            check_sides(mesh, design, equilibrium.configuration.r, target, free, equilibrium.history)
         except ConvergenceError as error:
-            iterations += len(error.history) - 1
+            iterations += max(0, len(error.history) - 1)
             if size == SMALLEST:
-                raise ConvergenceError(_given_up(done, gradient, error), error.history) from error
+                raise type(error)(_given_up(done, gradient, error), error.history) from error
             if say is not None:
                 say(f"{_part(done, size)} did not converge ({error}); trying it in 2 halves")
             size /= 2

@@ -12,6 +12,7 @@ from circuittex.base.frozen import frozen
 from circuittex.contact.state import ContactState
 from circuittex.design import Design
 from circuittex.electrical.fields import Fields
+from circuittex.electrical.network.ports import PortMatrix
 from circuittex.fit import Fit
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
@@ -70,6 +71,8 @@ class Record:
     """Levels in which the fibrils of the centre warp yarn lie at its centre crossing."""
     netlist: str
     """File of the detailed sub-circuit, relative to the results folder (if the study has one)."""
+    ports: PortMatrix = PortMatrix()
+    """The exact reduction of the circuit with merged contacts to the yarn ends."""
 
     @property
     def reaction(self) -> Floats:

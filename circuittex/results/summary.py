@@ -31,11 +31,15 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
         one) by the trapezoidal rule, how much of it was stored, and the rest; null for the relaxed state
     ``currents_A``, ``peak_temperature_K``
         current of each probe, and the largest temperature rise over all probes
-    ``Ry_ohm``, ``Rc_ohm``, ``fit_residual``, ``fit_warnings``
+    ``Ry_ohm``, ``Rc_ohm``, ``fit_residual``, ``fit_warnings``, ``network``, ``ports``
         the reduced network, its misfit, and what the fit warns of
     ``contact_points``, ``levels``
         contact points at full resolution; levels in which the fibrils of the centre warp yarn lie at its centre
         crossing
+    ``deepest_overlap``, ``largest_stress_MPa``
+        the deepest overlap of two fibrils over R + R', and the largest force of a section over its reference area
+    ``doubts``
+        why the state cannot be right or trusted, in sentences: overlaps, stresses, temperatures; empty if all is well
     ``netlist``
         path of the detailed netlist, relative to the folder of the file
     ``error_estimate``
@@ -56,7 +60,8 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
         node voltage, V per volt of the probe; ``max_current_difference``: in a terminal current, relative;
         ``reduced_difference``: of the reduced network's currents between the fit and ngspice, relative;
         ``merge_error``: largest relative change of a probe current by merging contacts; ``field_difference``: largest
-        relative difference of a probe current between the mechanical mesh and the circuit; ``native_difference``: the
+        relative difference of a probe current between the mechanical mesh and the circuit; ``native_limit``: what
+        rounding explains of the next where that exceeds 1e-9; ``native_difference``: the
         largest difference without ngspice; ``ngspice_limit``: the difference that ngspice's rounding explains;
         ``ngspice_checked``: whether ngspice answered; ``confirmed``: whether it did and all routes agree; ``note``: why
         not
@@ -74,14 +79,18 @@ import numpy as np
 
 from circuittex.base.arrays import Floats
 from circuittex.base.atomic import write_text
+from circuittex.fit import Fit
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results.bifurcation import BranchCheck, branch_statement, current_difference, force_difference
 from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.records import Record, Study
+from circuittex.results.soundness import deepest_overlap, doubt_statement, doubts, section_stress
 from circuittex.results.verification import AGREEMENT
 from circuittex.results.work import EnergyBalance, step_balances
 
-FORMAT = 1
+FORMAT = 2
+REDUCED = 1e-6
+"""Relative difference of ngspice's currents through the reduced network from those of the fit that is rounding."""
 
 
 def summary(study: Study) -> dict[str, Any]:
@@ -109,20 +118,26 @@ def write_summary(path: str | Path, study: Study) -> None:
 
 
 def table(study: Study) -> str:
-    """The closing table of a run: one line for each state, with its estimated error where there is one, then what the
-    study took, what the branch checks found, and whether ngspice confirmed it. A blank line parts the loading paths."""
+    """The closing table of a run: one line for each state, with its estimated error where there is one.
+
+    After it what the study took, what the branch checks found, which states to doubt, and whether ngspice confirmed it.
+    A blank line parts the loading paths."""
     head = ["state", "Fx warp N", "Fy weft N", *(f"{probe.name} A" for probe in study.design.probes)]
-    rows = [[*head, "Ry ohm", "Rc ohm", "iterations", "routes differ"]]
+    rows = [[*head, *_resistances(study), "overlap", "iterations", "routes differ"]]
     loading = ""
     for record in study.records:
         if record.loading != loading:
             rows.append([""] * len(rows[0]))
             loading = record.loading
-        numbers = [record.clamp_force[0, 0], record.clamp_force[1, 1], *record.currents, record.fit.Ry, record.fit.Rc]
-        rows.append([record.name, *(f"{number:#.4g}" for number in numbers)])
-        rows[-1] += [str(record.iterations), f"{difference(record):.1e}"]
+        network = record.fit.kind_resistance, record.fit.pair_resistance
+        numbers = [record.clamp_force[0, 0], record.clamp_force[1, 1], *record.currents, *np.concatenate(network)]
+        rows.append([record.name, *(f"{number:#.4g}" if number == number else "-" for number in numbers)])
+        rows[-1] += [f"{deepest_overlap(record.contacts)[0]:.2f}", str(record.iterations), f"{difference(record):.1e}"]
         if (error := study.error_of(record.name)) is not None:
-            rows.append(["  estimated error", *(_percent(quantity.relative) for quantity in error.quantities), "", ""])
+            cells = [_percent(quantity.relative) for quantity in error.quantities]
+            if len(cells) + 4 != len(rows[0]):  # estimated are the network's Ry and Rc as one number each
+                cells = [*cells[:-2], *["-"] * (len(rows[0]) - len(cells) - 2)]
+            rows.append(["  estimated error", *cells, "", "", ""])
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
         "  ".join(
@@ -132,8 +147,44 @@ def table(study: Study) -> str:
     ]
     warnings = [f"Error estimate of {error.state}: {text}." for error in study.errors for text in error.warnings]
     return "\n".join(
-        [*lines, "", *effort(study), *branch_statement(study.branches), *warnings, *ngspice_statement(study)]
+        [
+            *lines,
+            "",
+            *effort(study),
+            *branch_statement(study.branches),
+            *warnings,
+            *network_statement(study),
+            *doubt_statement(study),
+            *ngspice_statement(study),
+        ]
     )
+
+
+def _resistances(study: Study) -> list[str]:
+    """Heads of the columns of Ry and Rc: by kind where there are several."""
+    if not study.records:
+        return ["Ry ohm", "Rc ohm"]
+    fit = study.records[0].fit
+    kinds = [f"Ry {kind} ohm" for kind in fit.kinds] if len(fit.kinds) > 1 else ["Ry ohm"] * len(fit.kinds)
+    return kinds + ([f"Rc {pair} ohm" for pair in fit.pairs] if len(fit.pairs) > 1 else ["Rc ohm"] * len(fit.pairs))
+
+
+def network_statement(study: Study) -> tuple[str, ...]:
+    """Sentences that say what the reduced networks are worth, and what is not determined and why."""
+    sentences = []
+    errors = np.array([record.fit.pair_errors for record in study.records]).reshape(-1, 2)
+    if np.isfinite(errors).any():
+        worst, median = np.nanmax(errors[:, 0]), np.nanmax(errors[:, 1])
+        sentences.append(
+            f"Between any two yarn ends the reduced network is off by up to {100 * worst:.2g} % "
+            f"({100 * median:.2g} % in the median) in resistance."
+        )
+    told: dict[str, list[str]] = {}
+    for record in study.records:
+        for warning in record.fit.warnings:
+            told.setdefault(warning, []).append(record.name)
+    sentences += [f"{text[:1].upper()}{text[1:]} ({', '.join(names)})." for text, names in told.items()]
+    return tuple(sentences)
 
 
 def effort(study: Study) -> tuple[str, ...]:
@@ -188,18 +239,15 @@ def ngspice_statement(study: Study) -> tuple[str, ...]:
 
 
 def agrees(record: Record) -> bool:
-    """Whether the routes that answered say the same, about the detailed and, if there is one, the reduced network.
-
-    ngspice's rounding in the reduced network is less than in the detailed one, whose segments are shorter.
-    """
-    loosest = max(AGREEMENT, record.verification.ngspice_limit)
-    return record.verification.agrees and not record.reduced_difference > loosest
+    """Whether the routes that answered say the same of the circuit. The reduced network is no route of its own: how
+    well it is conditioned says nothing about them."""
+    return record.verification.agrees
 
 
 def confirmed(record: Record) -> bool:
-    """Whether ngspice answered and all routes agree; the reduced network counts where Ry and Rc are finite."""
-    answered = np.isfinite(record.reduced_difference) or not np.isfinite([record.fit.Ry, record.fit.Rc]).all()
-    return record.verification.ngspice_checked and agrees(record) and bool(answered)
+    """Whether ngspice answered and all routes agree, and the reduced network in ngspice has the currents of the fit."""
+    reduced = record.reduced_difference <= REDUCED or not record.fit.known or not record.fields
+    return record.verification.ngspice_checked and agrees(record) and bool(reduced)
 
 
 def _which(study: Study, records: list[Record]) -> str:
@@ -208,13 +256,9 @@ def _which(study: Study, records: list[Record]) -> str:
 
 
 def difference(record: Record) -> float:
-    """The largest difference between two routes, in node voltage per volt or relative current; nan if one is nan.
-
-    That of the reduced network counts where ngspice solved it.
-    """
+    """The largest difference between two routes, in node voltage per volt or relative current; nan if one is nan."""
     verification = record.verification
-    reduced = record.reduced_difference if np.isfinite(record.reduced_difference) else 0.0
-    return float(np.max([verification.max_voltage_difference, verification.max_current_difference, reduced]))
+    return float(np.max([verification.max_voltage_difference, verification.max_current_difference]))
 
 
 def insulated_resistance(mesh: FibrilMesh) -> float:
@@ -255,8 +299,13 @@ def _state(study: Study, record: Record, step: EnergyBalance | None) -> dict[str
         "Rc_ohm": record.fit.Rc,
         "fit_residual": record.fit.residual,
         "fit_warnings": record.fit.warnings,
+        "network": _network(record.fit),
+        "ports": {"names": record.ports.ports, "conductance_S": record.ports.conductance},
         "contact_points": record.contacts.n_contacts,
         "levels": record.levels,
+        "deepest_overlap": deepest_overlap(record.contacts)[0],
+        "largest_stress_MPa": section_stress(record).max(),
+        "doubts": [doubt.text for doubt in doubts(study, record)],
         "netlist": record.netlist,
         "error_estimate": None if error is None else _error_estimate(error),
         "branch_check": None if check is None else _branch_check(check),
@@ -268,11 +317,24 @@ def _state(study: Study, record: Record, step: EnergyBalance | None) -> dict[str
             "merge_error": verification.merge_error,
             "field_difference": verification.field_difference,
             "native_difference": verification.native_difference,
+            "native_limit": verification.native_limit,
             "ngspice_limit": verification.ngspice_limit,
             "ngspice_checked": verification.ngspice_checked,
             "confirmed": confirmed(record),
             "note": verification.note,
         },
+    }
+
+
+def _network(fit: Fit) -> dict[str, Any]:
+    worst, median = fit.pair_errors
+    return {
+        "fitted_to": fit.method,
+        "Ry_ohm": dict(zip(fit.kinds, fit.kind_resistance.tolist(), strict=True)),
+        "Rc_ohm": dict(zip(fit.pairs, fit.pair_resistance.tolist(), strict=True)),
+        "Rc_of_crossings_ohm": fit.crossings,
+        "worst_pair_error": worst,
+        "median_pair_error": median,
     }
 
 

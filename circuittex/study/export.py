@@ -6,11 +6,13 @@ import re
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from circuittex.base.atomic import write_text
 from circuittex.contact.merge import Simplified, simplify
 from circuittex.contact.state import ContactState
 from circuittex.design import Design, Probe, design_hash
-from circuittex.electrical.network.circuit import Circuit, build_circuit, reduced_circuit, yarn_end_terminals
+from circuittex.electrical.network.circuit import Circuit, build_circuit, yarn_end_terminals
 from circuittex.fit import Fit
 from circuittex.netlist import Header, deck, subcircuit
 
@@ -57,8 +59,8 @@ def probe_netlist(
 
 def reduced_netlist(design: Design, state: str, fit: Fit) -> str:
     """The `.subckt` of the reduced network [43-46], one pin for each yarn end."""
-    circuit = reduced_circuit((len(design.weave.warp), len(design.weave.weft)), fit.Ry, fit.Rc)
-    notes = (f"Ry = {fit.Ry!r} ohm a yarn segment, Rc = {fit.Rc!r} ohm a crossing", *fit.warnings)
+    circuit = fit.circuit()
+    notes = (*_values(fit), *fit.warnings)
     header = _header(design, state)("reduced network of yarn segments and crossings", notes=notes)
     return subcircuit(circuit, f"{state_word(state)} reduced {design.name}", header)
 
@@ -79,10 +81,25 @@ def detailed_file(state: str) -> str:
     return f"{state}.sub"
 
 
+def _values(fit: Fit) -> list[str]:
+    """What a reduced network's resistances are, and how far it is from the cell, one line each."""
+    lines = [
+        f"Ry = {ohm!r} ohm a segment: {kind}" for kind, ohm in zip(fit.kinds, fit.kind_resistance.tolist(), strict=True)
+    ]
+    lines += [
+        f"Rc = {ohm!r} ohm a crossing: {pair}"
+        for pair, ohm in zip(fit.pairs, fit.pair_resistance.tolist(), strict=True)
+    ]
+    worst, median = fit.pair_errors
+    if np.isfinite(worst):
+        lines.append(f"resistances between yarn ends are off by up to {worst:.2%}, {median:.2%} in the median")
+    return lines
+
+
 def netlist_files(design: Design, state: str, fit: Fit | None) -> tuple[str, ...]:
     """Names of the files of all netlists of a state: the detailed one, a deck for each probe, the reduced one."""
     decks = (f"{state}_{probe.name}.cir" for probe in design.probes)
-    reduced = (f"{state}_reduced.sub",) if fit is not None and 0 < fit.Ry < float("inf") else ()
+    reduced = (f"{state}_reduced.sub",) if fit is not None and fit.known else ()
     return (detailed_file(state), *decks, *reduced)
 
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from circuittex.base.errors import ConvergenceError
+from circuittex.base.errors import CircuitError, ConvergenceError
 from circuittex.contact.extract import contacts_of
-from circuittex.design import Design
-from circuittex.electrical.fields import solve_probes
-from circuittex.fit import fit_network
+from circuittex.design import Design, Terminal
+from circuittex.electrical.fields import Fields, solve_probes
+from circuittex.electrical.network.circuit import Circuit, build_circuit, yarn_end_terminals
+from circuittex.electrical.network.nodal import solve_nodal
+from circuittex.electrical.network.ports import port_matrix
+from circuittex.fit import fit_network, yarn_conductance
 from circuittex.geometry.levels import levels
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
@@ -21,8 +24,12 @@ from circuittex.results.outcome import Outcome
 from circuittex.results.records import Record, Study
 from circuittex.study.export import detailed_file, simplified
 from circuittex.study.plan import Step
-from circuittex.study.verify import field_convergence, verify
+from circuittex.study.soundness import check_sound
+from circuittex.study.verify import field_convergence, probe_circuits, verify
 from circuittex.study.verify_reduced import verify_reduced
+
+SMALL = 1e-6
+"""A probe with less than this part of a yarn's current: its digits are not those of the fields."""
 
 
 def reach(
@@ -61,17 +68,23 @@ def reach(
             say=lambda text: say(f"{step.name}: {text}\n"),
         )
     except ConvergenceError as error:
-        raise ConvergenceError(f"{step.name}: {error}", error.history) from error
+        raise type(error)(f"{step.name}: {error}", error.history) from error
 
 
 def record_state(study: Study, step: Step, reached: Increment, say: Callable[[str], None]) -> Record:
-    """Contacts, fields, circuit, verification and fit of one equilibrium."""
+    """Contacts, fields, circuit, verification and fit of one equilibrium.
+
+    Raises `PenetrationError`, naming the state, where fibrils passed through one another or overlap too deeply.
+    """
     say(f"{step.name}: fields, netlists and verification")
     design, mesh, equilibrium = study.design, study.mesh, reached.equilibrium
     contacts = contacts_of(design, mesh, equilibrium.configuration)
+    check_sound(study, step, equilibrium.configuration.r, contacts)
     fields = solve_probes(contacts, design.terminals, design.probes, contact_heat=design.electrical.contact_heat)
-    fit = fit_network([f.currents[0] for f in fields], design)
     merged = simplified(design, contacts).contacts
+    circuits = probe_circuits(contacts, design.terminals, design.probes)
+    ports = port_matrix(build_circuit(merged, conducting_ends(mesh)))
+    fit = fit_network(_told(fields, circuits, design), design, ports)
     convergence = np.empty((0, 2))
     if not step.loading:
         convergence = field_convergence(contacts, design.terminals, design.probes, fields)
@@ -93,11 +106,36 @@ def record_state(study: Study, step: Step, reached: Increment, say: Callable[[st
         fields=fields,
         fit=fit,
         reduced_difference=verify_reduced(design, fit),
-        verification=verify(contacts, merged, design.terminals, design.probes, fields=fields),
+        verification=verify(contacts, merged, design.terminals, design.probes, fields=fields, circuits=circuits),
         field_convergence=convergence,
         levels=levels(mesh, equilibrium.configuration.r, *centre_crossing(design)),
         netlist=f"netlists/{detailed_file(step.name)}",
+        ports=ports,
     )
+
+
+def _told(fields: Sequence[Fields], circuits: Sequence[Circuit], design: Design) -> list[float]:
+    """The currents of the probes, A; those that are lost in the rounding of the fields beside a yarn's, by the nodal
+    solution, which keeps the digits of small currents. nan where these are lost, too."""
+    largest = yarn_conductance(design)
+    currents = []
+    for field, circuit, probe in zip(fields, circuits, design.probes, strict=True):
+        current = float(field.currents[0])
+        if abs(current) < SMALL * largest * abs(probe.voltage):
+            try:
+                solution = solve_nodal(circuit, {probe.source: probe.voltage, probe.sink: 0.0})
+                current = float(solution.port_current[circuit.ports.index(probe.source)])
+            except CircuitError:  # lost in rounding there as well
+                current = float("nan")
+        currents.append(current)
+    return currents
+
+
+def conducting_ends(mesh: FibrilMesh) -> tuple[Terminal, ...]:
+    """A terminal for each end of a yarn that conducts."""
+    conducts = np.bincount(mesh.yarn, mesh.electrical_conductivity, len(mesh.yarn_names)) > 0.0
+    named = dict(zip(mesh.yarn_names, conducts, strict=True))
+    return tuple(terminal for terminal in yarn_end_terminals(mesh) if named[terminal.ends[0][0]])
 
 
 def outcome_of(design: Design, mesh: FibrilMesh, equilibrium: Equilibrium) -> Outcome:
@@ -105,7 +143,8 @@ def outcome_of(design: Design, mesh: FibrilMesh, equilibrium: Equilibrium) -> Ou
     contacts = contacts_of(design, mesh, equilibrium.configuration)
     fields = solve_probes(contacts, design.terminals, design.probes, contact_heat=design.electrical.contact_heat)
     currents = tuple(float(field.currents[0]) for field in fields)
-    fit = fit_network(currents, design)
+    merged = simplified(design, contacts).contacts
+    fit = fit_network(currents, design, port_matrix(build_circuit(merged, conducting_ends(mesh))))
     return Outcome(clamp_force(mesh, equilibrium.reaction), currents, fit.Ry, fit.Rc, equilibrium.energy)
 
 

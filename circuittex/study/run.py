@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -107,14 +108,15 @@ def _in_folder(
     jobs: Callable[[Study], Sequence[Job]],
 ) -> Study:
     """Complete the study and everything in its folder."""
-    total, kept = len(plan(study.design)), len(study.records)
-    if kept:
-        say(f"{kept} of {total} states are there already\n")
-    rest = Rest(total, kept, say)
+    loading = {step.name: step.loading for step in plan(study.design)}
+    known = {record.name for record in study.records}
+    if known:
+        say(f"{len(known)} of {len(loading)} states are there already\n")
+    rest = Rest(Counter(loading[name] for name in loading if name not in known), len(loading), workers, say)
 
     def keep(so_far: Study, record: Record) -> Study:
         so_far = keep_record(folder, so_far, record)
-        rest.done()
+        rest.done(loading[record.name])
         write_state(folder, so_far, record)
         write_numbers(folder, so_far)
         return so_far
@@ -127,7 +129,7 @@ def _in_folder(
         complete(folder, study)
     except (OSError, StoreError) as error:
         raise StoreError(
-            f"{error}; {rest.kept} of {total} states are kept in {folder}, and the same call goes on from there"
+            f"{error}; {rest.kept} of {rest.total} states are kept in {folder}, and the same call goes on from there"
         ) from error
     return study
 

@@ -10,7 +10,7 @@ from typing import ParamSpec, TypeVar
 import numpy as np
 
 from circuittex.base.arrays import Floats
-from circuittex.base.errors import NgspiceError, NgspiceUnavailableError
+from circuittex.base.errors import CircuitError, NgspiceError, NgspiceUnavailableError
 from circuittex.base.frozen import frozen
 from circuittex.contact.state import ContactState
 from circuittex.design import Probe, Terminal
@@ -49,6 +49,7 @@ def verify(
     probes: Sequence[Probe],
     *,
     fields: Sequence[Fields] | None = None,
+    circuits: Sequence[Circuit] | None = None,
     timeout: float = 60.0,
 ) -> Verification:
     """Compare finite elements, nodal analysis and ngspice for each probe.
@@ -58,8 +59,9 @@ def verify(
     since it joins only its own two terminals. ngspice answers all of them in one process within `timeout`
     seconds; where it does not, `ngspice_checked` is False and `note` says why. Its double precision is not refined,
     so that the circuit limits what it can confirm (`ngspice_limit`, see `rounding_errors`); the limit never loosens
-    the comparison of the other two. `fields` are the finite element solutions on all `contacts` with the mesh
-    "feet", for whoever has them already.
+    the comparison of the other two, which have one of their own where they differ (`native_limit`). `fields` are the
+    finite element solutions on all `contacts` with the mesh "feet" and `circuits` those of the probes on all
+    `contacts`, for whoever has them already.
     """
     if not probes:
         nan = float("nan")
@@ -67,21 +69,29 @@ def verify(
     clock = _Clock()
     coarse = clock("fields", solve_potentials, contacts, terminals, probes, mesh="mechanical")
     full = clock("fields", solve_potentials, contacts, terminals, probes) if fields is None else fields
-    _, full_fields, full_nodal = _native(clock, contacts, terminals, probes, full)
+    whole = probe_circuits(contacts, terminals, probes) if circuits is None else circuits
     merged = clock("fields", solve_potentials, simplified, terminals, probes)
-    circuits, *answers = _native(clock, simplified, terminals, probes, merged)
+    small = probe_circuits(simplified, terminals, probes)
+    try:
+        full_fields, full_nodal = _native(clock, whole, probes, full)
+        answers = _native(clock, small, probes, merged)
+    except CircuitError as error:
+        return _unresolved(error, clock)
     routes = dict(zip(("fields", "nodal"), answers, strict=True))
     yarn = _yarn_currents(contacts, probes)
     native = _difference(full_fields, full_nodal, yarn), _difference(answers[0], answers[1], yarn)
     note, limit, with_ngspice, failed = "", 0.0, [], False
     try:
-        routes["ngspice"] = clock("ngspice", _ngspice, circuits, probes, timeout)
-        limit = _ngspice_limit(circuits, probes, routes["nodal"], yarn)
+        routes["ngspice"] = clock("ngspice", _ngspice, small, probes, timeout)
+        limit = _rounding(small, probes, routes["nodal"], yarn)
         with_ngspice = [_difference(answer, routes["ngspice"], yarn) for answer in answers]
     except NgspiceError as error:
         note = f"ngspice did not check this state: {error}"
         failed = not isinstance(error, NgspiceUnavailableError)
     voltage, current = np.max([*native, *with_ngspice], axis=0)
+    native_limit = 0.0
+    if np.max(native) > AGREEMENT:
+        native_limit = max(_rounding(c, probes, a, yarn) for c, a in ((whole, full_nodal), (small, routes["nodal"])))
     found = Verification(
         routes=tuple(routes),
         max_voltage_difference=float(voltage),
@@ -95,9 +105,18 @@ def verify(
         ngspice_seconds=clock.seconds["ngspice"] if "ngspice" in routes else float("nan"),
         ngspice_checked="ngspice" in routes,
         note=note,
+        native_limit=native_limit,
         simulator_failed=failed,
     )
     return replace(found, note=_note(found))
+
+
+def _unresolved(error: CircuitError, clock: _Clock) -> Verification:
+    """What is left where nodal analysis finds resistances too far apart for its digits: nothing to compare with."""
+    nan = float("nan")
+    seconds = clock.seconds["fields"], clock.seconds["nodal"], nan
+    note = f"no route checks this state: nodal analysis says {error}"
+    return Verification(("fields",), nan, nan, nan, 0.0, nan, nan, *seconds, False, note)
 
 
 def _note(found: Verification) -> str:
@@ -152,17 +171,16 @@ def _pair(terminals: Sequence[Terminal], probe: Probe) -> list[Terminal]:
     return [t for name in (probe.source, probe.sink) for t in terminals if t.name == name]
 
 
+def probe_circuits(contacts: ContactState, terminals: Sequence[Terminal], probes: Sequence[Probe]) -> list[Circuit]:
+    """The circuit of each probe: its two terminals are joined, all other fibril ends insulated."""
+    return build_circuits(contacts, [_pair(terminals, probe) for probe in probes])
+
+
 def _native(
-    clock: _Clock,
-    contacts: ContactState,
-    terminals: Sequence[Terminal],
-    probes: Sequence[Probe],
-    fields: Sequence[Potential],
-) -> tuple[list[Circuit], list[_Answer], list[_Answer]]:
-    """The circuit of each probe, and what finite elements, solved already, and nodal analysis say about it."""
-    circuits = build_circuits(contacts, [_pair(terminals, probe) for probe in probes])
+    clock: _Clock, circuits: Sequence[Circuit], probes: Sequence[Probe], fields: Sequence[Potential]
+) -> tuple[list[_Answer], list[_Answer]]:
+    """What finite elements, solved already, and nodal analysis say about the circuit of each probe."""
     return (
-        circuits,
         [_from_fields(c, f) for c, f in zip(circuits, fields, strict=True)],
         [clock("nodal", _nodal, c, p) for c, p in zip(circuits, probes, strict=True)],
     )
@@ -202,10 +220,8 @@ def _ngspice(circuits: Sequence[Circuit], probes: Sequence[Probe], timeout: floa
     return answers
 
 
-def _ngspice_limit(
-    circuits: Sequence[Circuit], probes: Sequence[Probe], known: Sequence[_Answer], yarn: Floats
-) -> float:
-    """What ngspice's rounding may change in a voltage (V per V) or relative current of any probe."""
+def _rounding(circuits: Sequence[Circuit], probes: Sequence[Probe], known: Sequence[_Answer], yarn: Floats) -> float:
+    """What rounding may change in a voltage (V per V) or relative current of any probe."""
     errors = [rounding_errors(c, {p.source: 1.0, p.sink: 0.0}) for c, p in zip(circuits, probes, strict=True)]
     current = np.array([error[0] for _, error in errors]) * np.abs([probe.voltage for probe in probes])
     scale = _scale([answer.current for answer in known], yarn)

@@ -246,7 +246,7 @@ def _contact_names(contacts: ContactState, live: Ints) -> list[str]:
     ]
 
 
-def reduced_circuit(shape: tuple[int, int], Ry: float, Rc: float) -> Circuit:
+def reduced_circuit(shape: tuple[int, int], Ry: float | Floats, Rc: float | Floats) -> Circuit:
     """Return the reduced network [43-46] of a weave of `shape` = (warp, weft) yarns.
 
     Each crossing has a node on its warp and one on its weft yarn with `Rc` (ohm) between them, and four arms Ry/2
@@ -254,29 +254,37 @@ def reduced_circuit(shape: tuple[int, int], Ry: float, Rc: float) -> Circuit:
     lead to the ports 'warp1_minus', 'warp1_plus', .... With Rc infinite the yarns are insulated from each other.
     Resistors of the yarns are named 'ry_...' and come first, those of the crossings 'rc_...'.
 
+    `Ry` may be given yarn by yarn (warp + weft,), infinite for one that insulates, `Rc` crossing by crossing
+    (warp, weft).
+
     >>> reduced_circuit((4, 4), 0.2829, 10.0).n_resistors
     56
     """
     n, m = shape
-    if not (n > 0 and m > 0 and 0 < Ry < np.inf and Rc > 0):
+    if not (n > 0 and m > 0 and np.all(np.asarray(Ry) > 0) and np.min(Ry) < np.inf and np.all(np.asarray(Rc) > 0)):
         raise CircuitError(f"reduced network {n} x {m}, Ry = {Ry!r}, Rc = {Rc!r}: all must be positive, Ry finite")
+    along, across = np.broadcast_to(Ry, (n + m,)), np.broadcast_to(Rc, (n, m))
+    conducts = np.isfinite(along)
     yarns = [f"warp{i + 1}" for i in range(n)] + [f"weft{j + 1}" for j in range(m)]
     ports = [yarn_end_name(yarn, side) for yarn in yarns for side in (-1, 1)]
     warp = len(ports) + np.arange(n * m).reshape(n, m)
     weft = warp.T + n * m
     outer = np.arange(len(ports)).reshape(-1, 2)
     chains = [np.concatenate([ends[:1], row, ends[1:]]) for ends, row in zip(outer, [*warp, *weft], strict=True)]
-    arms = np.concatenate([np.stack([chain[:-1], chain[1:]], axis=1) for chain in chains])
-    ohm = np.concatenate([Ry * np.r_[0.5, np.ones(len(chain) - 3), 0.5] for chain in chains])
-    names = [f"ry_{yarn}_{k}" for yarn, chain in zip(yarns, chains, strict=True) for k in range(len(chain) - 1)]
-    crossings = [f"{i + 1}_{j + 1}" for i in range(n) for j in range(m)]
-    if Rc < np.inf:
-        arms = np.concatenate([arms, np.stack([warp.ravel(), weft.T.ravel()], axis=1)])
-        ohm = np.concatenate([ohm, np.full(n * m, Rc)])
-        names += [f"rc_{crossing}" for crossing in crossings]
+    lines = [(yarns[k], chains[k], along[k]) for k in np.flatnonzero(conducts)]
+    arms = np.concatenate([np.stack([chain[:-1], chain[1:]], axis=1) for _, chain, _ in lines])
+    ohm = np.concatenate([each * np.r_[0.5, np.ones(len(chain) - 3), 0.5] for _, chain, each in lines])
+    names = [f"ry_{yarn}_{k}" for yarn, chain, _ in lines for k in range(len(chain) - 1)]
+    joined = np.isfinite(across) & conducts[:n, None] & conducts[None, n:]
+    arms = np.concatenate([arms, np.stack([warp[joined], weft.T[joined]], axis=1)])
+    ohm = np.concatenate([ohm, across[joined]])
+    names += [f"rc_{i + 1}_{j + 1}" for i, j in np.argwhere(joined)]
     inner = [f"warp{i + 1}_at_weft{j + 1}" for i in range(n) for j in range(m)]
     inner += [f"weft{j + 1}_at_warp{i + 1}" for i in range(n) for j in range(m)]
-    nodes = unique_names(ports + inner)
+    there = np.ones(len(ports) + 2 * n * m, dtype=bool)
+    there[warp[~conducts[:n]]] = there[weft[~conducts[n:]]] = False  # an insulating yarn has no nodes at crossings
+    nodes = unique_names([name for name, kept in zip(ports + inner, there, strict=True) if kept])
+    arms = (np.cumsum(there) - 1)[arms]
     return Circuit(
         node_names=nodes,
         node_fibril=np.full(len(nodes), -1),

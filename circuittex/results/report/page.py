@@ -22,7 +22,16 @@ from circuittex.results.report.errors import error_section
 from circuittex.results.report.number import number as _number
 from circuittex.results.report.parameters import parameters
 from circuittex.results.report.template import render, table
-from circuittex.results.summary import agrees, confirmed, difference, effort, insulated_resistance, ngspice_statement
+from circuittex.results.soundness import deepest_overlap, doubt_statement, section_stress
+from circuittex.results.summary import (
+    agrees,
+    confirmed,
+    difference,
+    effort,
+    insulated_resistance,
+    network_statement,
+    ngspice_statement,
+)
 from circuittex.results.verification import AGREEMENT
 
 
@@ -88,7 +97,7 @@ def _facts(study: Study, claims: Table | None) -> dict[str, str]:
 
 
 def _verdict(study: Study) -> tuple[str, list[str]]:
-    """Whether the routes agree and ngspice took part, for a box that cannot be overlooked."""
+    """Whether the routes agree, ngspice took part and nothing is to be doubted, for a box that cannot be overlooked."""
     if not study.records:
         return "bad", ["No state has been recorded: there are no results yet."]
     sentences = list(ngspice_statement(study))
@@ -100,7 +109,9 @@ def _verdict(study: Study) -> tuple[str, list[str]]:
             f"The routes to every node voltage and probe current {'agree' if agree else 'DISAGREE'}: the largest "
             f"difference in any state is {worst:.1e} (at most {AGREEMENT:.0e} is required).",
         )
-    return "good" if all(confirmed(record) for record in study.records) else "bad", sentences
+    doubtful = doubt_statement(study)
+    good = all(confirmed(record) for record in study.records) and not doubtful
+    return "good" if good else "bad", [*sentences, *doubtful]
 
 
 def _states(study: Study) -> Markup:
@@ -132,9 +143,17 @@ def _forces(study: Study) -> dict[str, Any]:
 
 
 def _equilibrium(study: Study) -> dict[str, Any]:
-    head = ["state", "largest free force (N)", "Newton iterations", "parts", "levels", "contact points", "netlist"]
+    head = ["state", "largest free force (N)", "Newton iterations", "parts", "levels", "contact points"]
+    head += ["deepest overlap / (R + R')", "largest stress (MPa)", "netlist"]
     rows = [
-        [r.name, f"{r.residual:.1e}", *map(str, (r.iterations, r.parts, r.levels, r.contacts.n_contacts)), r.netlist]
+        [
+            r.name,
+            f"{r.residual:.1e}",
+            *map(str, (r.iterations, r.parts, r.levels, r.contacts.n_contacts)),
+            f"{deepest_overlap(r.contacts)[0]:.2f}",
+            _number(float(section_stress(r).max())),
+            r.netlist,
+        ]
         for r in study.records
     ]
     return {"head": head, "rows": rows}
@@ -152,6 +171,7 @@ def _network(study: Study) -> Markup:
         head=["state", "Ry (Ω)", "Rc (Ω)", "misfit", "warnings"],
         rows=rows,
         weighting=study.records[0].fit.weighting,
+        sentences=network_statement(study),
         insulated=_number(insulated_resistance(study.mesh)),
     )
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import is_dataclass, replace
 from pathlib import Path
@@ -19,7 +18,7 @@ from circuittex.results.bifurcation import BranchCheck
 from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.records import EXAMINATIONS, Examination, Record, Study, with_examination
 from circuittex.results.store.archive import ATTRIBUTES, MEANING, Digests, Former, Reader, Writer, reader_of, registry
-from circuittex.results.store.journal import Overlay, changing, commit, finish, overlay
+from circuittex.results.store.journal import Overlay, changing, commit, finish, overlay, snapshot
 from circuittex.results.store.meaning import meanings, summary
 
 FORMAT = "circuittex results"
@@ -42,8 +41,6 @@ GROUPS = {
     "branches": "Whether round-off chose the branch of a state, by its name.",
     "objects": "Where all of it is stored, each object once, by a digest of its content; every other place links here.",
 }
-TRIES = 20
-"""How often a file is read anew that a run is adding to."""
 
 
 def write_study_start(path: str | Path, study: Study) -> None:
@@ -123,22 +120,19 @@ def load_study(path: str | Path) -> Study:
     path = path / RESULTS if path.is_dir() else path
     if not path.is_file():
         raise StoreError(f"{path}: there is no results file here")
-    for attempt in range(TRIES):
-        before = changing(path)
+    before = changing(path)
+    with _as_store_error(path, "cannot be read"):
         try:
-            with _as_store_error(path, "cannot be read"):
-                study = _read(path)
-        except StoreError:
-            if changing(path) == before or attempt == TRIES - 1:
+            with path.open("rb") as handle:
+                return _read(overlay(path, handle))
+        except Exception:  # whatever h5py makes of pages that change while it reads them
+            if changing(path) == before:
                 raise
-            time.sleep(0.01 * attempt)
-            continue
-        return study
-    raise AssertionError("the last try returns or raises")
+            return _read(snapshot(path))
 
 
-def _read(path: Path) -> Study:
-    with path.open("rb") as handle, h5py.File(overlay(path, handle), "r") as file:
+def _read(content: Overlay) -> Study:
+    with h5py.File(content, "r") as file:
         version = _check_layout(file)
         former: Former = FORMER if version == 1 else {}
         reader = Reader(registry(Study), former, _author(file))

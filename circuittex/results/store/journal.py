@@ -120,8 +120,17 @@ class Overlay(io.RawIOBase):
 
 def overlay(path: Path, file: BinaryIO) -> Overlay:
     """The file at `path`, open as `file`, as it is to be read: with the changes of a journal that was left there."""
-    size = os.fstat(file.fileno()).st_size
+    size = file.seek(0, os.SEEK_END)
     return Overlay(file, size, _pages(_journal(path), size))
+
+
+def snapshot(path: Path) -> Overlay:
+    """The file at `path` as it is at one moment, in memory: a change that comes while it is read begins that anew."""
+    while True:
+        before = changing(path)
+        taken = overlay(path, io.BytesIO(path.read_bytes()))
+        if changing(path) == before:
+            return taken
 
 
 def finish(path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 
 from circuittex.base.arrays import Floats
 from circuittex.base.atomic import write_text
-from circuittex.base.errors import ConvergenceError, DesignError, StoreError
+from circuittex.base.errors import CircuittexWarning, ConvergenceError, DesignError, StoreError
 from circuittex.base.frozen import frozen
 from circuittex.base.version import __version__
 from circuittex.design import Design, design_hash
@@ -51,7 +52,9 @@ def compute_member(design: Design, folder: str) -> Outcome:
     place.mkdir(exist_ok=True)
     failure = ""
     try:
-        records: Sequence[Record] = run_study(design, place, workers=1).records
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", CircuittexWarning)  # said once, of the ensemble's own folder
+            records: Sequence[Record] = run_study(design, place, workers=1).records
     except DesignError as error:
         records, failure = (), str(error)
     except ConvergenceError as error:

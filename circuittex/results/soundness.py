@@ -1,0 +1,101 @@
+"""What in a recorded state strains belief: overlaps, stresses and temperatures, and the sentences that say so."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from circuittex.base.arrays import Floats
+from circuittex.base.frozen import frozen
+from circuittex.contact.state import ContactState
+from circuittex.results.records import Record, Study
+
+HOT = 300.0
+"""Rise of temperature, K, beyond which no textile stays what it is: polymers have melted or charred."""
+STRONGEST = 1e4
+"""MPa: no fibre, of carbon or any other matter, carries more."""
+SOLID, ELASTOMER = 0.2, 100.0
+"""Drawn nylon carries a sixth of its modulus, perfect crystals a tenth, no solid a fifth. Matter with a modulus of up
+to `ELASTOMER` MPa is rubber, which is stretched until the stress is the modulus."""
+
+
+def deepest_overlap(contacts: ContactState) -> tuple[float, int, int]:
+    """Largest overlap over R + R' and its two fibrils, the lower number first; 0 where nothing touches.
+
+    The law of contact is that of Hertz, for overlaps that are small beside the radii.
+    """
+    if contacts.n_contacts == 0:
+        return 0.0, 0, 0
+    a, b, radius = contacts.fibril_a, contacts.fibril_b, contacts.mesh.radius
+    overlap = -contacts.gap / (radius[a] + radius[b])
+    deepest = int(np.argmax(overlap))
+    first, second = sorted((int(a[deepest]), int(b[deepest])))
+    return float(overlap[deepest]), first, second
+
+
+def strength(modulus: Floats) -> Floats:
+    """The stress, MPa, that no material of that Young's modulus (MPa) carries: min(E, max(100, E / 5), 1e4).
+
+    >>> strength(np.array([10.0, 3e3, 200e3])).tolist()
+    [10.0, 600.0, 10000.0]
+    """
+    return np.minimum(np.minimum(modulus, np.maximum(ELASTOMER, SOLID * modulus)), STRONGEST)
+
+
+def section_stress(record: Record) -> Floats:
+    """(M,) mean stress of each element's section, MPa: its force over the reference area."""
+    mesh = record.contacts.mesh
+    return np.asarray(record.section_force / mesh.area[mesh.element_fibril])
+
+
+@frozen
+class Doubt:
+    """One reason to doubt a state."""
+
+    kind: str
+    """'overlap', 'stress' or 'temperature'."""
+    excess: float
+    """How far it is beyond what gives no reason, as a ratio of at least 1."""
+    text: str
+    """The reason, without the name of the state."""
+
+
+def doubts(study: Study, record: Record) -> tuple[Doubt, ...]:
+    """What cannot be right in a state, or not be trusted; empty if all is well."""
+    mesh = record.contacts.mesh
+    overlap, limit = deepest_overlap(record.contacts)[0], study.design.numerics.overlap_warning
+    stress, fibril = section_stress(record), mesh.element_fibril
+    carried = strength(mesh.youngs_modulus[fibril])
+    worst, rise = int(np.argmax(stress / carried)), record.peak_temperature
+    found = [
+        Doubt(
+            "overlap",
+            overlap / limit,
+            f"fibrils overlap by {overlap:.2f} of R + R' (warned of from {limit:g} on, numerics.overlap_warning): "
+            "the law of contact is for small overlaps",
+        ),
+        Doubt(
+            "stress",
+            float(stress[worst] / carried[worst]),
+            f"the stress reaches {stress[worst]:.3g} MPa in {mesh.yarn_names[mesh.yarn[fibril[worst]]]}: no material "
+            f"of that modulus carries more than {carried[worst]:.3g} MPa",
+        ),
+        Doubt(
+            "temperature",
+            rise / HOT,
+            f"the temperature rises by up to {rise:.3g} K (warned of from {HOT:g} K on): no heat is lost "
+            "to the air in this model and conductivities are constant, so that this is no prediction",
+        ),
+    ]
+    return tuple(doubt for doubt in found if doubt.excess >= 1.0)
+
+
+def doubt_statement(study: Study) -> tuple[str, ...]:
+    """A sentence for each kind of doubt that any state gives reason for, about the worst of them."""
+    found = [(doubt, record.name) for record in study.records for doubt in doubts(study, record)]
+    sentences = []
+    for kind in dict.fromkeys(doubt.kind for doubt, _ in found):
+        states = [name for doubt, name in found if doubt.kind == kind]
+        worst, name = max((one for one in found if one[0].kind == kind), key=lambda one: one[0].excess)
+        others = f" and, less, in {len(states) - 1} other state{'s' * (len(states) > 2)}" if len(states) > 1 else ""
+        sentences.append(f"Do not trust {name}{others}: {worst.text}.")
+    return tuple(sentences)

@@ -1,0 +1,252 @@
+"""Every command, script and netlist that the documentation shows, run as it stands there.
+
+What they work on has the names that the documentation uses and is small: the delivered design with one fibril a yarn,
+whose yarns, pins, probes and title are those of the original.
+"""
+
+from __future__ import annotations
+
+import re
+import runpy
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_paper_tables import STUDY, TABLE
+
+from circuittex.command.cli import main
+from circuittex.command.exit_codes import ExitCode
+from circuittex.command.options import build_parser
+from circuittex.design import load_design, starter
+from circuittex.electrical.spice.ngspice import run_deck
+from circuittex.results.store import load_study, write_study_start
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+SECONDS = 120
+"""For a script of its own on a loaded machine; alone it takes some seconds."""
+SMALLER = {
+    "rows = [3, 4, 3]": "rows = [1]",
+    'amplitude = "0.525 mm"': 'amplitude = "0.2 mm"',  # at which single fibrils touch
+    'strain = "10 %"': 'strain = "1 %"',
+    "steps = 4": "steps = 1",
+}
+"""What makes the delivered design a small one."""
+FEWER = {"--members 32": "--members 2", "members=32": "members=2"}
+"""What a page asks for, and what is enough to see that it works."""
+PROSE = {"text", "{eval-rst}", "{toctree}", "{include}"}
+"""Blocks in which there is nothing to run."""
+
+
+def blocks(page: Path) -> Iterator[tuple[str, str]]:
+    """Language and text of each block of code: fenced ones say what they are, indented ones begin like it."""
+    text = page.read_text(encoding="utf-8")
+    for language, inner in re.findall(r"^```(\S+).*\n((?:.*\n)*?)```$", text, re.MULTILINE):
+        yield language, inner
+    unfenced = re.sub(r"^```(?:.*\n)*?```$", "", text, flags=re.MULTILINE)
+    for block in re.findall(r"(?:(?<=\n\n)|\A)(?:    .*\n(?:\n(?=    ))?)+", unfenced):
+        inner = re.sub("^    ", "", block, flags=re.MULTILINE)
+        first = inner.split()[0]
+        kinds = {"circuittex": "console", "make": "console", "python": "console", "from": "python", "import": "python"}
+        yield ("spice" if inner.startswith("* ") else kinds.get(first, "text")), inner
+
+
+def shown(language: str) -> list[tuple[str, str]]:
+    """Name of the page and text of each block in a language."""
+    return [(page.name, inner) for page in PAGES for kind, inner in blocks(page) if kind == language]
+
+
+def alike(command: str) -> str:
+    """The command without the names of designs and results, which are all small here."""
+    return re.sub(r"results/\w+", "RESULTS", re.sub(r"(examples/)?\w+\.toml", "DESIGN", command))
+
+
+COMMANDS = sorted(
+    {line.partition(" # ")[0].strip() for _, inner in shown("console") for line in inner.splitlines() if line.strip()}
+)
+DIFFERENT = sorted({alike(command): command for command in COMMANDS if command.startswith("circuittex ")}.values())
+PYTHON = [(name, inner) for name, inner in shown("python") if name != "README.md"]  # test_readme.py has that one
+
+
+@pytest.fixture(scope="module")
+def small() -> str:
+    """The delivered design, made small."""
+    text = (ROOT / "examples" / "plain_weave.toml").read_text(encoding="utf-8")
+    for original, replacement in SMALLER.items():
+        assert text.count(original) == 1
+        text = text.replace(original, replacement)
+    return f"{text}\n[numerics]\nelements = 8\n"
+
+
+@pytest.fixture(scope="module")
+def computed(small: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results of the small design."""
+    folder = tmp_path_factory.mktemp("computed")
+    (folder / "small.toml").write_text(small, encoding="utf-8")
+    assert main(["run", str(folder / "small.toml"), "--out", str(folder / "out"), "--quiet"]) == ExitCode.DONE
+    return folder / "out"
+
+
+@pytest.fixture
+def folder(small: str, computed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where a reader is: designs and results under the names of the documentation."""
+    (tmp_path / "examples").mkdir()
+    for name in ("weave", "examples/plain_weave", "examples/paper", "examples/paper_table"):
+        (tmp_path / f"{name}.toml").write_text(small, encoding="utf-8")
+    for name in ("weave", "plain_weave"):
+        shutil.copytree(computed, tmp_path / "results" / name)
+    for name, study in (("paper", STUDY), ("paper_table", TABLE)):  # their cell is no small one
+        (tmp_path / "results" / name).mkdir()
+        write_study_start(tmp_path / "results" / name / "results.h5", study)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def fewer(text: str) -> str:
+    for many, few in FEWER.items():
+        text = text.replace(many, few)
+    return text
+
+
+def test_every_block_is_of_a_kind_that_is_run() -> None:
+    """A block in another language, or one that is not recognised, needs a test of its own."""
+    kinds = {kind for page in PAGES for kind, _ in blocks(page)}
+    assert kinds - PROSE == {"console", "python", "toml", "spice"}
+    words = [inner for page in PAGES for kind, inner in blocks(page) if kind == "text"]
+    assert not any(
+        re.search(r"^(circuittex|make|python|ngspice|pip|import|from) ", text, re.MULTILINE) for text in words
+    )
+    assert len(DIFFERENT) > 8, "the pages are found"
+
+
+def test_files_that_commands_name_are_delivered() -> None:
+    named = {name for command in COMMANDS for name in re.findall(r"(?:examples|benchmarks)/[\w./]+", command)}
+    assert named
+    assert [name for name in sorted(named) if not (ROOT / name).is_file()] == []
+
+
+@pytest.mark.parametrize("command", DIFFERENT)
+def test_command(command: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before, _, file = fewer(command).partition(" > ")
+    words = shlex.split(before)[1:]
+    if words[0] == "run" and len(words) == 4:  # with further options it completes what is there
+        shutil.rmtree(folder / words[3], ignore_errors=True)
+    if words[-1] == "--help":
+        with pytest.raises(SystemExit, match="0"):
+            main(words)
+        return
+    assert main(words) == ExitCode.DONE
+    out = capsys.readouterr().out
+    if file:
+        (folder / file).write_text(out, encoding="utf-8")
+        assert load_design(folder / file).name
+        assert out == starter()
+    if words[0] == "run":
+        assert all(
+            (Path(words[3]) / name).exists() for name in ("report.html", "summary.json", "results.h5", "figures")
+        )
+        assert len(load_study(Path(words[3]) / "results.h5").records) == 2
+
+
+@pytest.mark.parametrize("command", [line for line in COMMANDS if line.startswith("python ")])
+def test_script(command: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A script that writes a page of the documentation writes a copy of it here."""
+    _, script, *arguments = shlex.split(command)
+    page = folder / "page.md"
+    shutil.copy(ROOT / "docs" / "paper.md", page)
+    before = page.read_text(encoding="utf-8")
+    monkeypatch.setattr(sys, "argv", [script, *arguments, "--page", str(page)])
+    runpy.run_path(str(ROOT / script), run_name="__main__")
+    assert page.read_text(encoding="utf-8") != before
+
+
+@pytest.mark.parametrize("command", [line for line in COMMANDS if line.startswith("make ")])
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+def test_make_knows_the_target(command: str) -> None:
+    words = [*shlex.split(command), "--dry-run"]
+    planned = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=SECONDS)
+    assert planned.returncode == 0, planned.stderr
+    assert {
+        "run": "circuittex run examples/plain_weave.toml --out results/plain_weave",
+        "test": "pytest",
+    }[words[1]] in planned.stdout
+
+
+@pytest.mark.parametrize(("page", "text"), PYTHON, ids=[name for name, _ in PYTHON])
+def test_python(page: str, text: str, folder: Path) -> None:
+    """As a script with a main part: Dask's processes import the file that starts them."""
+    body = "".join(f"    {line}\n" if line else "\n" for line in fewer(text).splitlines())
+    (folder / "script.py").write_text(f'if __name__ == "__main__":\n{body}', encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "script.py"], cwd=folder, capture_output=True, text=True, timeout=SECONDS
+    )
+    assert done.returncode == 0, f"{page}: {done.stderr}"
+
+
+@pytest.mark.parametrize(("page", "text"), shown("toml"))
+def test_part_of_a_design(page: str, text: str, small: str, tmp_path: Path) -> None:
+    (tmp_path / "part.toml").write_text(f"{small}\n{text}", encoding="utf-8")
+    design = load_design(tmp_path / "part.toml")
+    assert page == "ensemble.md"
+    assert design.packing.lateral == pytest.approx(0.0075), "7.5 um in mm"
+
+
+def test_options_that_are_mentioned_exist() -> None:
+    """`circuittex COMMAND --option` in the text, complete or not."""
+    (commands,) = [action for action in build_parser()._actions if hasattr(action, "choices") and action.choices]
+    options = {name: set(parser._option_string_actions) for name, parser in commands.choices.items()}  # type: ignore
+    mentioned = [
+        words.split() for page in PAGES for words in re.findall(r"`circuittex ([a-z][^`]*)`", page.read_text("utf-8"))
+    ]
+    assert len(mentioned) > 5
+    for name, *words in mentioned:
+        assert {word.partition("=")[0] for word in words if word.startswith("-")} <= options[name], (name, words)
+
+
+# The sub-circuit of docs/netlist.md
+
+
+(DECK,) = (inner for name, inner in shown("spice") if name == "netlist.md")
+REDUCED = DECK.replace("relaxed.sub", "relaxed_reduced.sub").replace(" relaxed_plain", " relaxed_reduced_plain")
+
+
+def current(deck: str, netlists: Path) -> float:
+    """What ngspice says that the deck's source feeds in, A."""
+    included = re.sub(r"(?<=^\.include )\S+", lambda name: str(netlists / name[0]), deck, flags=re.MULTILINE)
+    return -float(run_deck(included).plots[0].current("v1")[0])
+
+
+def test_the_sub_circuit_runs_beside_the_delivered_netlists(computed: Path) -> None:
+    """1 V across one yarn of which each end is a pin, the others open.
+
+    Alone the yarn carries sigma A V / L; what touches it only adds ways for the current (Rayleigh), here through
+    contacts of 0.01 S/mm2 that are all but nothing beside a fibril.
+    """
+    design = load_design(ROOT / "examples" / "plain_weave.toml")  # not the small one: yarns and title must be its
+    yarns = [f"{way}{n}" for way in ("warp", "weft") for n in range(1, 5)]
+    assert np.shape(design.weave.draft) == (4, 4)
+    card = (computed / "netlists" / "relaxed.sub").read_text("ascii").replace("\n+", "")
+    _, name, *pins = re.search(r"^\.subckt .*", card, re.MULTILINE)[0].split()  # type: ignore[index]
+    assert pins == [f"{yarn}_{end}" for yarn in yarns for end in ("minus", "plus")]
+    call = re.search(r"^X1 .*", DECK, re.MULTILINE)[0].split()  # type: ignore[index]
+    assert (call[-1], len(call) - 2) == (name, len(pins))
+    assert (call[1:-1][pins.index("warp2_minus")], call[1:-1][pins.index("warp2_plus")]) == ("in", "0")
+
+    alone = 10.0 * np.pi * 0.15**2 / (4 * 2.0)
+    found = current(DECK, computed / "netlists")
+    assert alone * (1 - 1e-9) <= found < 1.01 * alone
+    assert current(REDUCED, computed / "netlists") == pytest.approx(found, rel=0.01)
+
+
+def test_a_deck_runs_as_it_stands(computed: Path, tmp_path: Path) -> None:
+    shutil.copy(computed / "netlists" / "relaxed_straight.cir", tmp_path / "deck.cir")
+    (command,) = re.findall(r"`(ngspice [^`]*)`", (ROOT / "docs" / "netlist.md").read_text("utf-8"))
+    done = subprocess.run(shlex.split(command), cwd=tmp_path, capture_output=True, text=True, timeout=SECONDS)
+    assert done.returncode == 0
+    assert (tmp_path / "out.raw").exists()
+    assert "error" not in (done.stdout + done.stderr).lower()

@@ -204,8 +204,8 @@ BAD: list[tuple[list[tuple[Keys, Any]], str, str]] = [
     ([(("numerics", "merge_length"), 8.1)], "numerics.merge_length", "at most 8 mm, the length of the longest fibril"),
     ([(("numerics", "merge_length"), "1 m")], "numerics.merge_length", "at most 8 mm"),
     ([(("numerics", "snap_length"), -1)], "numerics.snap_length", ">= 0 mm"),
-    ([(("numerics", "snap_length"), 9)], "numerics.snap_length", "at most 0.04 mm, a tenth of the shortest element"),
-    ([(("numerics", "snap_length"), "0.041 mm")], "numerics.snap_length", "at most 0.04 mm"),
+    ([(("numerics", "snap_length"), 9)], "numerics.snap_length", "at most 0.02857 mm, a tenth of the shortest element"),
+    ([(("numerics", "snap_length"), "0.029 mm")], "numerics.snap_length", "at most 0.02857 mm"),
     (
         [*ONE_CROSSING, (("numerics", "elements"), 2), (("numerics", "order"), 1)],
         "numerics.elements",
@@ -280,7 +280,7 @@ def test_the_unchanged_design_is_accepted() -> None:
 
 def test_bounds_that_depend_on_the_mesh_can_be_reached() -> None:
     """Fibrils of 8 mm in 20 elements; one crossing of fibrils of 2 mm in 3 elements of order 1."""
-    lengths = {"merge_length": 8.0, "snap_length": 0.04}
+    lengths = {"merge_length": 8.0, "snap_length": 0.028}
     parse_design(changed(*((("numerics", key), value) for key, value in lengths.items())))
     parse_design(changed(*ONE_CROSSING, (("numerics", "elements"), 3), (("numerics", "order"), 1)))
 

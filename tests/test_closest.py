@@ -11,8 +11,8 @@ from scipy.optimize import minimize_scalar
 
 from circuittex.base.arrays import Floats
 from circuittex.base.errors import DesignError
-from circuittex.contact.closest import _closest
-from circuittex.contact.curve import BASIS, CurveTable, bezier, curve_table, evaluate
+from circuittex.contact.closest import _Meeting, _root, _Scratch
+from circuittex.contact.curve import BASIS, CurveTable, bezier, curve_table, curve_through, evaluate
 from circuittex.contact.penalty import contact_points
 from circuittex.geometry.mesh import FibrilMesh
 
@@ -163,20 +163,25 @@ def test_beyond_a_fibrils_end_the_end_itself_is_closest() -> None:
     assert np.all(found.position_b[onto & ~first] == 5.0)
 
 
-@given(seed=st.integers(0, 2**32 - 1), s=st.floats(0.0, 7.0), away=st.floats(-0.2, 0.2))
-def test_the_foot_of_a_normal_is_found_and_found_again(seed: int, s: float, away: float) -> None:
-    """From the neighbouring chord's position the search reaches the foot; started at the foot it stays."""
+@given(seed=st.integers(0, 2**32 - 1), s=st.floats(0.01, 6.99), away=st.floats(-0.2, 0.2), start=st.floats(0.0, 1.0))
+def test_the_foot_of_a_normal_is_found_from_anywhere_and_found_again(
+    seed: int, s: float, away: float, start: float
+) -> None:
+    """From any place on its interval the search reaches the foot; started at the foot it stays."""
     t = np.linspace(0.0, 2.0, 8)
     bend = np.random.default_rng(seed).uniform(-0.2, 0.2)
     mesh = fibrils_through([np.stack([3 * t, bend * t**2, np.zeros(8)], axis=1)])
     table, r = curve_table(mesh), mesh.position
-    work, point = np.empty((4, 4)), on_curve(table, r, 0, s) + np.array([0.0, 0.0, away])
+    point = on_curve(table, r, 0, s) + np.array([0.0, 0.0, away])
+    scratch = _Scratch(point, np.empty((3, 3)), np.empty(4), np.empty((64, 8)))
+    k = float(int(s))
 
     def search(start: float) -> float:
-        return float(_closest(BASIS, r, table.window, table.kind, 0, 7, point, start, work))
+        meeting = _Meeting(0, 0, 0, 7, 1.0)
+        return float(_root(curve_through(table, r), meeting, start, k, k + 1.0, 1.0, scratch))
 
-    found = search(min(7.0, max(0.0, s + 0.4)))
-    assert found == pytest.approx(s, abs=1e-7 if min(s, 7 - s) < 1e-6 else 1e-12)
+    found = search(k + start)
+    assert found == pytest.approx(s, abs=1e-12)
     assert search(found) == pytest.approx(found, abs=1e-13)
 
 

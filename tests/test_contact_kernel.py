@@ -199,15 +199,6 @@ def test_cylinders_crossed_at_right_angles() -> None:
         assert np.all(error <= w**2 * (jumps / 4 + change / 12))
 
 
-def test_stacked_cylinders_in_a_curve_do_not_see_their_own_fibril() -> None:
-    """A fibril folded onto itself touches nothing: contact is between different fibrils."""
-    t = np.linspace(0.0, 2 * np.pi, 13)
-    loop = np.stack([0.5 * np.cos(t), 0.5 * np.sin(t), 0.01 * t], axis=1)
-    energy, force = forces(fibrils_through([loop, straight([5, 0, 0], [6, 0, 0], 4)], radius=R))
-    assert energy == 0.0
-    assert np.all(force == 0.0)
-
-
 def test_penalty_scales_energy_and_force() -> None:
     mesh = CASES[0]
     results = []

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
 from circuittex.base.arrays import Floats
-from circuittex.contact.curve import CurveTable, bezier, curve_table
-from circuittex.contact.search import CONTROL_MOTION, Candidates, coupled_nodes, find_candidates
+from circuittex.contact.curve import CurveTable, bezier, curve_table, curve_through
+from circuittex.contact.hull import hulls
+from circuittex.contact.search import CONTROL_MOTION, Candidates, bent_back, coupled_nodes, find_candidates
 from circuittex.geometry.mesh import FibrilMesh
 
 SAMPLES = 17  # points of an interval in the brute-force check
@@ -42,12 +43,12 @@ def sampled(mesh: FibrilMesh, table: CurveTable, r: Floats) -> Floats:
 
 
 def close_pairs(mesh: FibrilMesh, table: CurveTable, r: Floats, skin: float) -> set[tuple[int, int]]:
-    """All pairs (interval, interval of another fibril) with sampled points within R + R' + skin: brute force."""
+    """All pairs of intervals with sampled points within R + R' + skin: brute force."""
     points = sampled(mesh, table, r).reshape(-1, 3)
     n = len(table.fibril)
     distance = cdist(points, points).reshape(n, SAMPLES, n, SAMPLES).min(axis=(1, 3))
     radius = mesh.radius[table.fibril]
-    near = (distance <= radius[:, None] + radius[None, :] + skin) & (table.fibril[:, None] != table.fibril[None, :])
+    near = distance <= radius[:, None] + radius[None, :] + skin
     return set(map(tuple, np.argwhere(near).tolist()))
 
 
@@ -67,7 +68,6 @@ def test_no_pair_within_reach_is_missed(shape: dict[str, float], skin: float) ->
     table = curve_table(mesh)
     found = find_candidates(table, mesh.position, mesh.radius, skin)
     assert close_pairs(mesh, table, mesh.position, skin) <= covered(found)
-    assert not np.any(table.fibril[found.interval] == found.fibril)
     assert np.array_equal(table.fibril[found.first], found.fibril)
     assert np.array_equal(table.fibril[found.last], found.fibril)
 
@@ -77,14 +77,74 @@ def test_long_thin_elements_that_cross_far_from_their_middles() -> None:
     lines = [straight([0, 0, 0], [40, 0, 0], 4), straight([0.2, -0.1, 0.015], [0.2, 39.9, 0.015], 4)]
     mesh = fibrils_through([*lines, straight([0, 5, 0], [40, 5, 0], 4)], radius=0.01)
     found = find_candidates(curve_table(mesh), mesh.position, mesh.radius, 0.0)
-    assert rows(found) == {(0, 1, 4, 4), (4, 0, 0, 0), (4, 2, 8, 8), (8, 1, 4, 4)}
+    across = {(0, 1, 4, 4), (4, 0, 0, 0), (4, 2, 8, 8), (8, 1, 4, 4)}
+    own = {(i, i // 4, max(4 * (i // 4), i - 1), min(4 * (i // 4) + 3, i + 1)) for i in range(12)}
+    assert rows(found) == across | own
 
 
-def test_fibrils_apart_give_no_candidates() -> None:
+def test_fibrils_apart_are_near_themselves_only() -> None:
     mesh = fibrils_through([straight([0, y, 0], [1, y, 0], 4) for y in (0, 1)])
-    found = find_candidates(curve_table(mesh), mesh.position, mesh.radius, 0.05)
-    assert len(found.interval) == 0
-    assert coupled_nodes(curve_table(mesh), found).shape[1] == 2
+    table = curve_table(mesh)
+    found = find_candidates(table, mesh.position, mesh.radius, 0.05)
+    assert np.array_equal(found.fibril, table.fibril[found.interval])
+    assert not np.any(bent_back(table, found, turns(table, mesh.position), 0.01))
+    pairs = coupled_nodes(table, found, np.zeros(len(found.interval), dtype=bool))
+    assert np.all(np.abs(np.diff(pairs)) < 4)  # the windows alone
+
+
+def turns(table: CurveTable, r: Floats) -> Floats:
+    return hulls(curve_through(table, r)).turn
+
+
+def test_turns_are_those_of_the_tangent() -> None:
+    """An arc of 3 rad in a plane turns by as much, give or take its ends' parabolas; a straight fibril does not."""
+    t = np.linspace(0.0, 3.0, 25)
+    mesh = fibrils_through([np.stack([np.cos(t), np.sin(t), 0 * t], axis=1), straight([5, 0, 0], [6, 0, 0], 4)])
+    turn = turns(curve_table(mesh), mesh.position)
+    curve = reference_curve(mesh, mesh.position, 0)
+    for k in range(24):
+        a, b = curve(k, 1), curve(k + 1, 1)
+        assert turn[k + 1] - turn[k] == pytest.approx(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b), rel=1e-9)
+    assert turn[24] == pytest.approx(3.0, abs=0.02)
+    assert np.all(np.diff(turn[24:]) == 0.0)
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_bounds_hold_at_every_point(seed: int) -> None:
+    """Distance from the chord, speed and second derivative at samples of crumpled fibrils."""
+    mesh = tangle(seed, fibrils=2, noise=0.2)
+    table, r = curve_table(mesh), mesh.position
+    hull = hulls(curve_through(table, r))
+    chord = hull.points[:, 3] - hull.points[:, 0]
+    for i, f in enumerate(table.fibril):
+        curve, k = reference_curve(mesh, r, f), i - table.first_interval[f]
+        assert hull.tangent[i + f] == pytest.approx(curve(k, 1), abs=1e-13)
+        for t in np.linspace(0.0, 1.0, 9):
+            from_chord = curve(k + t) - hull.points[i, 0] - t * chord[i]
+            assert np.linalg.norm(from_chord) <= hull.bulge[i] + 1e-13
+            assert np.linalg.norm(curve(k + t, 1)) >= hull.least_speed[i] - 1e-13
+            piece = [np.polynomial.Polynomial(curve.c[::-1, k, c]).deriv(2)(t) for c in range(3)]
+            assert np.linalg.norm(piece) <= hull.bend[i] + 1e-12
+
+
+def test_room_is_made_before_a_fibril_touches_itself() -> None:
+    """A hairpin closing from a gentle bend: the pattern is renewed, if no earlier, once a quarter turn is near."""
+
+    def bent(angle: float) -> Floats:
+        t = np.linspace(-angle / 2, angle / 2, 17)
+        return np.stack([0.2 * np.sin(t), 0.2 * np.cos(t), 0.02 * t], axis=1)
+
+    other = straight([99, 0, 0], [100, 0, 0], 4)
+    term, q = contact_term(fibrils_through([bent(0.5), other]), skin=10.0)
+    term.prepare(q)
+    assert np.all(np.abs(np.diff(term.pairs()[1])) < 4)
+    moved = q.reshape(-1, 9).copy()
+    moved[:17, :3] = bent(6.0)
+    assert term.prepare(moved.ravel())
+    assert not term.prepare(moved.ravel())
+    found = term.touching(moved.ravel())
+    assert len(found.overlap) > 0
+    assert np.abs(np.diff(term.pairs()[1])).max() == 16
 
 
 @given(shape=shapes)
@@ -149,7 +209,9 @@ def test_candidates_hold_for_motions_within_the_skin(seed: int, share: float) ->
     motion *= share * skin / (2 * CONTROL_MOTION) / np.linalg.norm(motion, axis=1)[:, None]
     moved = q.reshape(-1, 9).copy()
     moved[:, :3] += motion
-    assert not term.prepare(moved.ravel())
+    held = term._held
+    term.prepare(moved.ravel())  # a fibril that bends back may ask for more room in the pattern
+    assert term._held is held
     assert close_pairs(mesh, table, r + motion, 0.0) <= covered(kept)
 
 
@@ -182,7 +244,8 @@ def test_every_coupled_node_pair_is_announced(seed: int, order: int) -> None:
     term, q = contact_term(mesh)
     term.prepare(q)
     table = term.table
-    pairs = coupled_nodes(table, find_candidates(table, term.positions(q), mesh.radius, term.skin))
+    found = find_candidates(table, term.positions(q), mesh.radius, term.skin)
+    pairs = coupled_nodes(table, found, np.zeros(len(found.interval), dtype=bool))
     announced = {frozenset(pair) for pair in pairs.tolist()}
     found = term.touching(q)
     last = np.diff(table.first_interval)[found.fibril_b] - 1

@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from circuittex.base.errors import DesignError
 from circuittex.base.frozen import same
 from circuittex.design import (
+    HERTZ,
     Design,
     Electrical,
     Loading,
@@ -95,12 +96,22 @@ def test_the_papers_study_is_both_loadings_to_a_quarter(file: str, parameters: s
     assert parameters in design.name
 
 
-def test_the_starter_states_the_defaults_and_the_first_example() -> None:
+def test_the_starter_is_the_first_example_with_what_follows_from_the_fibrils() -> None:
+    """Hertz's penalty, a mesh by the fibrils, a network by all pairs, and a wave that stretches them less."""
     design = parse_design(tomllib.loads(starter()))
-    assert same(design.numerics, Numerics())
+    example = load_design(EXAMPLES / "plain_weave.toml")
+    assert same(design.numerics, Numerics(elements="auto", contact_points="auto"))
     assert same(design.electrical, Electrical(fit="all-pairs"))
-    own = dataclasses.replace(design, electrical=Electrical())
-    assert same(own, load_design(EXAMPLES / "plain_weave.toml"))
+    assert design.contact.penalty == HERTZ
+    own = dataclasses.replace(
+        design,
+        name=example.name,
+        electrical=example.electrical,
+        numerics=example.numerics,
+        contact=example.contact,
+        weave=dataclasses.replace(design.weave, amplitude=example.weave.amplitude),
+    )
+    assert same(own, example)
 
 
 def test_the_starter_mentions_every_key() -> None:

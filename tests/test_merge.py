@@ -11,10 +11,12 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from synthetic import fibrils, touching, woven
 
+import circuittex as ct
 from circuittex.base.errors import DesignError
 from circuittex.base.frozen import same
 from circuittex.contact.merge import drop_vanishing, merge_contacts, simplify, snap_feet
 from circuittex.contact.state import ContactState
+from circuittex.design import Terminal
 
 COLUMNS = [f.name for f in fields(ContactState) if f.name not in ("mesh", "axial_factor")]
 LENGTHS = st.sampled_from([0.01, 0.1, 0.3, 1.0, 3.0])
@@ -113,11 +115,64 @@ def test_neither_order_nor_sides_matter(seed: int, length: float) -> None:
     assert equal(merge_contacts(other, length), merge_contacts(state, length))
 
 
-def test_one_contact_a_pair_and_bin_is_left() -> None:
-    merged = merge_contacts(random_state(3), 0.5)
-    keys = np.column_stack([merged.fibril_a, merged.fibril_b, np.floor(merged.xi_a / 0.5)])
+@given(SEEDS, LENGTHS)
+def test_only_neighbours_on_both_fibrils_are_merged(seed: int, length: float) -> None:
+    """Against groups made one contact at a time: same bin on the lower fibril, chains of bins on the other."""
+    state = random_state(seed)
+    low_first = state.fibril_a < state.fibril_b
+    low, high = (np.where(low_first, *p) for p in ((state.fibril_a, state.fibril_b), (state.fibril_b, state.fibril_a)))
+    xi_low, xi_high = (np.where(low_first, *p) for p in ((state.xi_a, state.xi_b), (state.xi_b, state.xi_a)))
+    spans: dict[tuple[int, ...], set[int]] = {}
+    for a, b, xa, xb in zip(low, high, xi_low, xi_high, strict=True):
+        spans.setdefault((a, b, int(xa / length)), set()).add(int(4 * (xb / length)))
+    expected = 0
+    for bins in map(sorted, spans.values()):
+        runs = np.split(bins, np.flatnonzero(np.diff(bins) > 4) + 1)
+        expected += sum(1 if run[-1] - run[0] < 6 else len(run) for run in runs)
+    merged = merge_contacts(state, length)
     assert np.all(merged.fibril_a < merged.fibril_b)
-    assert len(np.unique(keys, axis=0)) == merged.n_contacts
+    assert merged.n_contacts == expected
+
+
+@pytest.mark.parametrize(("apart", "left"), [(0.2, 1), (1.0, 1), (1.6, 2), (3.4, 2)])
+def test_contacts_far_apart_on_one_fibril_stay_two(apart: float, left: int) -> None:
+    """Together on the lower fibril, `apart` on the other: from 3/2 of the merge length on always two."""
+    for swap in (False, True):
+        a, b = (np.array([2.2, 2.4]), np.array([0.2, 0.2 + apart]))
+        state = touching(fibrils([8.0, 8.0]), [swap] * 2, b if swap else a, [not swap] * 2, a if swap else b)
+        merged = merge_contacts(state, 1.0)
+        assert merged.n_contacts == left
+        if left == 2:
+            assert_array_equal(merged.xi_b, b)
+
+
+def test_a_bridge_is_not_shorted_by_merging() -> None:
+    """0.2 and 0.4 mm of a fibril in series with 3.4 mm beside 0.2 mm of another and two contacts: 2.39698 ohm."""
+    design = ct.plain_weave("paper-code", yarns=2, rows=(1,))
+    mesh = ct.build_mesh(design)
+    one = np.ones(2)
+    contacts = ContactState(
+        mesh=mesh,
+        fibril_a=np.array([0, 0]),
+        fibril_b=np.array([2, 2]),
+        xi_a=np.array([2.2, 2.4]),
+        xi_b=np.array([0.2, 3.6]),
+        gap=-0.01 * one,
+        line_load=0.05 * one,
+        width=0.01 * one,
+        weight=0.1 * one,
+        conductance=one,
+        heat_conductance=one,
+        axial_factor=np.ones(len(mesh.elements)),
+    )
+    merged = merge_contacts(contacts, 1.0)
+    circuit = ct.build_circuit(merged, [Terminal("in", (("weft1", -1),)), Terminal("out", (("weft1", 1),))])
+    ohm = 1.0 / float(ct.solve_nodal(circuit, {"in": 1.0, "out": 0.0}).port_current[0])
+    per_mm = 1 / (10 * np.pi * 0.15**2)
+    by_hand = per_mm * (0.2 + 1 / (1 / 3.4 + 1 / (0.2 + 2 / per_mm)) + 0.4)
+    assert by_hand == pytest.approx(2.396980, abs=5e-7)
+    assert merged.n_contacts == 2
+    assert ohm == pytest.approx(by_hand, rel=1e-12)
 
 
 def test_points_without_width_merge_at_their_plain_mean() -> None:

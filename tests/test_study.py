@@ -13,12 +13,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 from canned import Canned, canned_study, files, report, untimed
 from fabrics import small_cell
 
 from circuittex.base.compiled import available_cores
-from circuittex.base.errors import ConvergenceError, DesignError, FolderError, StoreError
+from circuittex.base.errors import ConvergenceError, DesignError, FolderError, PenetrationError, StoreError
 from circuittex.base.frozen import same
 from circuittex.base.lock import locked
 from circuittex.design import Design, equal_steps, shear, uniaxial
@@ -179,6 +180,27 @@ def test_a_path_that_does_not_converge_keeps_the_rest(tmp_path: Path, monkeypatc
         run_study(STUDY.design, tmp_path, workers=1)
     assert [r.name for r in load_study(tmp_path / "results.h5").records] == ["relaxed", "shear-0.025"]
     assert not (tmp_path / "report.html").exists()
+
+
+def test_an_equilibrium_that_is_not_found_ends_in_what_to_change(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One sentence: out of iterations, stuck before that; fibrils pressed through one another say their own."""
+    design = replace(cell(), loading=())
+    short = replace(design, numerics=replace(design.numerics, max_iterations=1))
+    with pytest.raises(ConvergenceError, match=r"^relaxed: .*; raise numerics\.max_iterations above 1 or [^\n.]*$"):
+        run_study(short, workers=1)
+
+    def stuck(error: type[ConvergenceError]) -> Callable[..., object]:
+        def relax(*_: object, **__: object) -> object:
+            raise error("stuck", np.zeros((3, 4)))
+
+        return relax
+
+    monkeypatch.setattr("circuittex.study.record.relax", stuck(ConvergenceError))
+    with pytest.raises(ConvergenceError, match=r"^relaxed: stuck; try another number of numerics\.elements than 4, "):
+        run_study(design, workers=1)
+    monkeypatch.setattr("circuittex.study.record.relax", stuck(PenetrationError))
+    with pytest.raises(PenetrationError, match=r"^relaxed: stuck$"):
+        run_study(design, workers=1)
 
 
 # Folders

@@ -1,122 +1,291 @@
-"""Closest points between the contact points of one fibril and the centre line of another [24]."""
+"""Where a fibril comes closest to the contact points of another, or of its own, and where in between it is furthest.
+
+From a point x the distance to a fibril has a minimum at each place where they may touch, and between two neighbouring
+minima a maximum. Both are roots of phi'(s) = (y(s) - x).y'(s), on each interval a polynomial of fifth degree. Where the
+bounds of `Hull` show that phi' rises, its signs at both ends tell all. Elsewhere its Bernstein coefficients do: they
+change sign at least as often as it has roots, and exactly once where it has one.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import compiled
 from circuittex.contact.curve import evaluate
+from circuittex.contact.hull import QUARTER
 
 MAX_STEPS = 60
 """Newton with bisection as its safeguard needs 4 or 5; bisection alone would need 52 for full precision."""
+LEAST_PIECE = 2.0**-30
+"""Part of an interval within which a minimum and a maximum are not told apart: between them the distance changes by the
+cube of it, far below round-off, and so does what they add to the energy."""
+
+
+class Fibrils(NamedTuple):
+    """Tables of the fibrils, as compiled functions take them."""
+
+    radius: Floats
+    """(F,) R, mm."""
+    first_node: Ints
+    """(F + 1,) offsets into the nodes."""
+    first_interval: Ints
+    """(F + 1,) offsets into the intervals."""
+    fibril: Ints
+    """(I,) fibril of each interval."""
+
+
+class Found(NamedTuple):
+    """Room for what `find_contacts` finds: places where the distance is smallest or largest and within reach."""
+
+    row: Ints
+    """the candidate."""
+    point: Ints
+    """the contact point of its interval."""
+    position: Floats
+    """place on the other fibril, in nodes."""
+    overlap: Floats
+    """R + R' - |d| > 0, mm."""
+    sign: Floats
+    """1 where the distance is smallest, -1 where it is largest."""
+
+
+class _Scratch(NamedTuple):
+    x: Floats
+    """(3,) the contact point."""
+    work: Floats
+    """(3, 3) y, y', y''."""
+    weight: Floats
+    """(4,) weights of the nodes."""
+    pieces: Floats
+    """(depth, 8) pieces of an interval still to be looked at: Bernstein coefficients, lower and upper end."""
+
+
+class _Meeting(NamedTuple):
+    row: int
+    """the candidate."""
+    point: int
+    """the contact point of its interval."""
+    base: int
+    """first interval of the other fibril."""
+    n: int
+    """number of its intervals."""
+    reach: float
+    """R + R', mm."""
+
+
+def find_contacts(curve: Any, hull: Any, fibrils: Any, points: Floats, rows: Any, room: int) -> Found:
+    """All places within reach, for every candidate and every contact point of its interval, in that order.
+
+    `points` (parity, T) are the local coordinates of the contact points of an interval, rows padded with -1; `rows` are
+    `Candidates`; `room` is the number of places expected: where there are more, they are found anew.
+    """
+    while True:
+        row, point = np.empty((2, room), dtype=np.int64)
+        position, overlap, sign = np.empty((3, room))
+        found = Found(row, point, position, overlap, sign)
+        count = int(_find(curve, hull, fibrils, points, rows, found))
+        if count <= room:
+            return Found(row[:count], point[:count], position[:count], overlap[:count], sign[:count])
+        room = count
 
 
 @compiled
-def _nearest_chord(r: Any, x: Any, first_node: int, first: int, last: int, bulge: Any, base: int, found: Any) -> float:
-    """Best starting position among the chords first..last, and a lower bound of the distance to the curve.
-
-    found (1,) receives the position in nodes. Chord k joins nodes first_node + k and k + 1.
-    """
-    best, bound = np.inf, np.inf
-    for k in range(first, last + 1):
-        a = first_node + k
-        along, length, t = 0.0, 0.0, 0.0
-        for c in range(3):
-            edge = r[a + 1, c] - r[a, c]
-            along += edge * (x[c] - r[a, c])
-            length += edge * edge
-        t = min(1.0, max(0.0, along / length))
-        distance = 0.0
-        for c in range(3):
-            distance += (x[c] - r[a, c] - t * (r[a + 1, c] - r[a, c])) ** 2
-        distance = np.sqrt(distance)
-        bound = min(bound, distance - bulge[base + k])
-        if distance < best:
-            best = distance
-            found[0] = k + t
-    return bound
+def _find(curve: Any, hull: Any, fibrils: Any, points: Any, rows: Any, found: Any) -> int:
+    """Fill `found` as far as it reaches; the number of places there are."""
+    scratch = _Scratch(np.empty(3), np.empty((3, 3)), np.empty(4), np.empty((64, 8)))
+    # Taken out of their tuples once: to do so for every point would cost as much as the search.
+    r, x, bulge, tangent, bend, speed = curve.r, scratch.x, hull.bulge, hull.tangent, hull.bend, hull.least_speed
+    interval, other, first, last, turn = rows.interval, rows.fibril, rows.first, rows.last, hull.turn
+    first_interval, first_node, fibril, radius = (
+        fibrils.first_interval,
+        fibrils.first_node,
+        fibrils.fibril,
+        fibrils.radius,
+    )
+    count = 0
+    for i in range(interval.shape[0]):
+        a, g = interval[i], other[i]
+        f = fibril[a]
+        own = f == g
+        if own and turn[last[i] + 1] - turn[a] < QUARTER and turn[a + 1] - turn[first[i]] < QUARTER:
+            continue
+        base, node, n, reach = (
+            first_interval[g],
+            first_node[g],
+            first_interval[g + 1] - first_interval[g],
+            radius[f] + radius[g],
+        )
+        parity = (a - first_interval[f]) % points.shape[0]
+        for p in range(points.shape[1]):
+            t = points[parity, p]
+            if t < 0.0:
+                continue
+            evaluate(curve.basis[curve.kind[a]], r, curve.window[a], t, 0, scratch.weight, x)
+            meeting = _Meeting(i, p, base, n, reach)
+            known, slope, far = -1, 0.0, 0.0  # slope and square of the distance at the node `known`
+            for j in range(first[i], last[i] + 1):
+                k = j - base
+                distance, start = _chord(r, x, node + k)
+                if distance - bulge[j] >= reach:
+                    continue
+                if known != k:
+                    slope, far = _at_node(r, tangent, x, node + k)
+                next_slope, next_far = _at_node(r, tangent, x, node + k + 1)
+                if k == 0 and not _negative(slope):
+                    count = _record(curve, meeting, 0.0, 1.0, scratch, found, count)
+                rises = (np.sqrt(max(far, next_far)) + bulge[j]) * bend[j] < speed[j] ** 2
+                if own or not rises:
+                    itself = t + a - j if own else -1.0
+                    _coefficients(hull.points[j], x, scratch.pieces[0])
+                    scratch.pieces[0, 0], scratch.pieces[0, 5] = slope, next_slope
+                    count = _isolate(curve, meeting, k, itself, scratch, found, count)
+                elif _negative(slope) and not _negative(next_slope):
+                    s = _root(curve, meeting, k + start, float(k), k + 1.0, 1.0, scratch)
+                    count = _record(curve, meeting, s, 1.0, scratch, found, count)
+                if k == n - 1 and _negative(next_slope):
+                    count = _record(curve, meeting, float(n), 1.0, scratch, found, count)
+                known, slope, far = k + 1, next_slope, next_far
+    return count
 
 
 @compiled
-def _closest(basis: Any, r: Any, window: Any, kind: Any, base: int, n: int, x: Any, s: float, work: Any) -> float:
-    """Position of the closest point of a fibril of n intervals (the first is `base`) to x, starting from s.
+def _chord(r: Any, x: Any, a: int) -> tuple[float, float]:
+    """Distance of x from the chord between the nodes a and a + 1, and where on it (0 to 1)."""
+    along, length, square = 0.0, 0.0, 0.0
+    for c in range(3):
+        edge = r[a + 1, c] - r[a, c]
+        along += edge * (x[c] - r[a, c])
+        length += edge * edge
+    t = min(1.0, max(0.0, along / length))
+    for c in range(3):
+        square += (x[c] - r[a, c] - t * (r[a + 1, c] - r[a, c])) ** 2
+    return np.sqrt(square), t
 
-    Finds the root of phi'(s) = -(x - r).r' by Newton's method inside a bracket that bisection shrinks.
-    work (4, 4): scratch for r, r', r'' and the weights.
+
+@compiled
+def _at_node(r: Any, tangent: Any, x: Any, node: int) -> tuple[float, float]:
+    """phi' and the square of the distance at a node."""
+    slope, square = 0.0, 0.0
+    for c in range(3):
+        u = r[node, c] - x[c]
+        slope += u * tangent[node, c]
+        square += u * u
+    return slope, square
+
+
+@compiled
+def _negative(value: float) -> bool:
+    """Below zero, or zero with a minus sign: so every value has one of two signs."""
+    return bool(np.copysign(1.0, value) < 0.0)
+
+
+@compiled
+def _record(curve: Any, meeting: Any, s: float, sign: float, scratch: Any, found: Any, count: int) -> int:
+    """Keep the place s if it is within reach."""
+    k = min(meeting.n - 1, int(s))
+    x, y = scratch.x, scratch.work[0]
+    interval = meeting.base + k
+    evaluate(curve.basis[curve.kind[interval]], curve.r, curve.window[interval], s - k, 0, scratch.weight, y)
+    overlap = meeting.reach - np.sqrt((x[0] - y[0]) ** 2 + (x[1] - y[1]) ** 2 + (x[2] - y[2]) ** 2)
+    if overlap <= 0.0:
+        return count
+    if count < found.row.shape[0]:
+        found.row[count], found.point[count] = meeting.row, meeting.point
+        found.position[count], found.overlap[count], found.sign[count] = s, overlap, sign
+    return count + 1
+
+
+@compiled
+def _root(curve: Any, meeting: Any, s: float, low: float, high: float, sign: float, scratch: Any) -> float:
+    """The root of sign phi', which rises from low to high (in nodes, on one interval), by Newton's method from s.
+
+    Bisection keeps it between its bounds.
     """
-    low, high = max(0.0, np.floor(s) - 1.0), min(float(n), np.floor(s) + 2.0)
+    x, work, weight, r, k, close = scratch.x, scratch.work, scratch.weight, curve.r, int(low), 1e-14 * meeting.n
+    basis, window = curve.basis[curve.kind[meeting.base + k]], curve.window[meeting.base + k]
     for _ in range(MAX_STEPS):
-        k = min(n - 1, int(s))
-        b, w = basis[kind[base + k]], window[base + k]
         for order in range(3):
-            evaluate(b, r, w, s - k, order, work[3], work[order])
+            evaluate(basis, r, window, s - k, order, weight, work[order])
         slope, bend = 0.0, 0.0
         for c in range(3):
             slope -= (x[c] - work[0, c]) * work[1, c]
             bend += work[1, c] * work[1, c] - (x[c] - work[0, c]) * work[2, c]
+        slope, bend = sign * slope, sign * bend
         if slope > 0.0:
             high = s
         else:
             low = s
-        step = -slope / bend if bend > 0.0 else (1.0 if slope < 0.0 else -1.0)
-        new = s + step
-        if new < low or new > high:
-            new = low if slope > 0.0 and low == 0.0 else (high if slope < 0.0 and high == n else 0.5 * (low + high))
-            if new == s:
-                return s
-        if abs(new - s) <= 1e-14 * n:
+        new = s - slope / bend if bend > 0.0 else np.inf
+        if new < low - close or new > high + close:
+            new = 0.5 * (low + high)
+        new = min(high, max(low, new))
+        if abs(new - s) <= close:
             return new
         s = new
     return s
 
 
 @compiled
-def find_contacts(
-    r: Any,
-    radius: Any,
-    basis: Any,
-    window: Any,
-    kind: Any,
-    first_interval: Any,
-    first_node: Any,
-    fibril: Any,
-    bulge: Any,
-    points: Any,
-    interval: Any,
-    other: Any,
-    first: Any,
-    last: Any,
-    position: Any,
-    overlap: Any,
-) -> None:
-    """For every candidate and every contact point of its interval: closest position and overlap (<= 0: none).
+def _isolate(curve: Any, meeting: Any, k: int, itself: float, scratch: Any, found: Any, count: int) -> int:
+    """All places on interval k of a fibril on which phi' may fall, in their order.
 
-    r (N, 3); points (T,) local coordinates t of the contact points of an interval, by interval parity
-    (rows of a (2, T) table, padded with -1); interval, other, first, last: the candidates; position and
-    overlap (candidates, T) are filled.
+    The first of the scratch's pieces holds its Bernstein coefficients. `itself`: where the contact point itself lies,
+    outside of 0 to 1 if elsewhere; that is not one of the places.
     """
-    x, work, found = np.empty(4), np.empty((4, 4)), np.empty(1)
-    for i in range(interval.shape[0]):
-        a, g = interval[i], other[i]
-        f = fibril[a]
-        base = first_interval[g]
-        reach = radius[f] + radius[g]
-        parity = (a - first_interval[f]) % points.shape[0]
-        for p in range(points.shape[1]):
-            overlap[i, p] = -1.0
-            t = points[parity, p]
-            if t < 0.0:
-                continue
-            evaluate(basis[kind[a]], r, window[a], t, 0, work[3], x)
-            bound = _nearest_chord(r, x, first_node[g], first[i] - base, last[i] - base, bulge, base, found)
-            if bound >= reach:
-                continue
-            n = first_interval[g + 1] - base
-            s = _closest(basis, r, window, kind, base, n, x, found[0], work)
-            k = min(n - 1, int(s))
-            evaluate(basis[kind[base + k]], r, window[base + k], s - k, 0, work[3], work[0])
-            distance = np.sqrt((x[0] - work[0, 0]) ** 2 + (x[1] - work[0, 1]) ** 2 + (x[2] - work[0, 2]) ** 2)
-            position[i, p] = s
-            overlap[i, p] = reach - distance
+    pieces = scratch.pieces
+    pieces[0, 6], pieces[0, 7] = 0.0, 1.0
+    top = 0
+    # Before the point itself the distance falls, behind it it rises.
+    if itself == 0.0:
+        pieces[0, 0] = 0.0
+    elif itself == 1.0:
+        pieces[0, 5] = -0.0
+    elif 0.0 < itself < 1.0:
+        _split(pieces[0], pieces[1], itself)
+        pieces[0, 0], pieces[1, 5] = 0.0, -0.0
+        top = 1
+    while top >= 0:
+        piece = pieces[top]
+        changes = 0
+        for m in range(5):
+            changes += _negative(piece[m]) != _negative(piece[m + 1])
+        low, high, falling = piece[6], piece[7], _negative(piece[5])
+        if changes > 1 and high - low > LEAST_PIECE:
+            _split(piece, pieces[top + 1], 0.5)
+            top += 1
+            continue
+        top -= 1
+        if changes % 2 == 1:
+            sign = -1.0 if falling else 1.0
+            s = _root(curve, meeting, k + 0.5 * (low + high), k + low, k + high, sign, scratch)
+            count = _record(curve, meeting, s, sign, scratch, found, count)
+    return count
+
+
+@compiled
+def _coefficients(points: Any, x: Any, c: Any) -> None:
+    """The Bernstein coefficients of phi' = (y - x).y' on an interval with the given Bézier points, into c (6,)."""
+    for m in range(6):
+        c[m] = 0.0
+    for i in range(4):
+        for j in range(3):
+            dot = 0.0
+            for axis in range(3):
+                dot += (points[i, axis] - x[axis]) * (points[j + 1, axis] - points[j, axis])
+            c[i + j] += 3.0 * dot * (1.0, 3.0, 3.0, 1.0)[i] * (1.0, 2.0, 1.0)[j]
+    for m in range(6):
+        c[m] /= (1.0, 5.0, 10.0, 10.0, 5.0, 1.0)[m]
+
+
+@compiled
+def _split(piece: Any, left: Any, t: float) -> None:
+    """Cut a piece at t of its length: `left` becomes its first part, and itself the second (de Casteljau)."""
+    middle = piece[6] + t * (piece[7] - piece[6])
+    left[6], left[7], piece[6] = piece[6], middle, middle
+    for m in range(6):
+        left[m] = piece[0]
+        for q in range(5 - m):
+            piece[q] += t * (piece[q + 1] - piece[q])

@@ -8,7 +8,7 @@ the last three nodes. Positions on a fibril are counted in nodes: s = 2.25 lies 
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,6 +40,24 @@ class CurveTable:
     """(I,) first node of the window."""
     kind: Ints
     """(I,) 0 first, 1 inner, 2 last interval of its fibril."""
+
+
+class Curve(NamedTuple):
+    """The centre lines of one configuration, as compiled functions take them."""
+
+    r: Floats
+    """(N, 3) nodes, mm."""
+    basis: Floats
+    """`BASIS`."""
+    window: Ints
+    """(I,) `CurveTable.window`."""
+    kind: Ints
+    """(I,) `CurveTable.kind`."""
+
+
+def curve_through(table: CurveTable, r: Floats) -> Curve:
+    """The centre lines through nodes r (N, 3)."""
+    return Curve(r=r, basis=BASIS, window=table.window, kind=table.kind)
 
 
 def curve_table(mesh: FibrilMesh) -> CurveTable:
@@ -77,7 +95,7 @@ def weights(basis: Any, t: float, order: int, c: Any) -> None:
 
 @compiled
 def evaluate(basis: Any, r: Any, window: int, t: float, order: int, c: Any, x: Any) -> None:
-    """Fill x (3,) with the curve, or its derivative of the given order with respect to t."""
+    """Fill x (3,) with the curve, or its derivative of the given order with respect to t; c (4,) with the weights."""
     weights(basis, t, order, c)
     for k in range(3):
         x[k] = c[0] * r[window, k] + c[1] * r[window + 1, k] + c[2] * r[window + 2, k] + c[3] * r[window + 3, k]

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
+
 import numpy as np
+from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats
 from circuittex.contact.law import (
@@ -13,7 +16,8 @@ from circuittex.contact.law import (
     pair_heat_transfer,
     pair_penalty,
 )
-from circuittex.contact.penalty import PenaltyContact
+from circuittex.contact.penalty import PenaltyContact, Touching
+from circuittex.contact.share import shares
 from circuittex.contact.state import ContactState
 from circuittex.design import ContactLaw, Design
 from circuittex.geometry.mesh import FibrilMesh
@@ -32,19 +36,22 @@ def contact_state(
     """The contact points of a configuration with their loads, Hertz half-widths and conductances.
 
     p = P* o [28], a = sqrt(4 R* p / (pi E*)) [29], G = sigma_c a w [31] (0 where either fibril insulates),
-    heat conductance h_c a w [30]. `per_element` contact points an element; `conduction` is 'reference' or
-    'current' (`axial_factor`).
+    heat conductance h_c a w [30]. A contact point has a row for each minimum of the distance, with its part of
+    the weight (`share`). `per_element` contact points an element; `conduction` is 'reference' or 'current'
+    (`axial_factor`).
     """
     space = beam_space(mesh)
     term = PenaltyContact(mesh, law=law, per_element=per_element)
-    touching, table = term.touching(space.vector(configuration)), term.table
+    found, table = term.touching(space.vector(configuration)), term.table
+    part = shares(found, table)
+    touching, part = _take(found, part > 0.0), part[part > 0.0]
     a, b = table.fibril[touching.interval_a], touching.fibril_b
     spacing = mesh.length / (np.diff(mesh.first_node) - 1)
     load = pair_penalty(mesh, law, a, b) * touching.overlap
     e, nu = mesh.youngs_modulus, mesh.poisson_ratio
     radius = effective_radius(mesh.radius[a], mesh.radius[b])
     width = hertz_width(load, radius, effective_modulus(e[a], nu[a], e[b], nu[b]))
-    weight = term.weight[a]
+    weight = term.weight[a] * part
     return ContactState(
         mesh=mesh,
         fibril_a=a,
@@ -61,13 +68,17 @@ def contact_state(
     )
 
 
+def _take(found: Touching, rows: NDArray[np.bool_]) -> Touching:
+    return replace(found, **{field.name: getattr(found, field.name)[rows] for field in fields(found)})
+
+
 def contacts_of(design: Design, mesh: FibrilMesh, configuration: Configuration) -> ContactState:
     """The contact state of a configuration of a design's fibrils, by the design's own laws and numerics."""
     return contact_state(
         mesh,
         configuration,
         design.contact,
-        per_element=design.numerics.contact_points,
+        per_element=design.resolution.contact_points,
         conduction=design.electrical.conduction,
     )
 

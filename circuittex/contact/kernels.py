@@ -1,118 +1,183 @@
 """Compiled loops over contacts: gradient and exact tangent of the contact potential.
 
 With u = x_a - x_b(s), c the weights of the eight nodes in u, c' their derivative in s and
-w = c u_s + c' u, eliminating the closest position s from 1/2 P o^2 gives, for nodes i and j,
+w = c u_s + c' u, eliminating the position s of the smallest or largest distance from 1/2 P o^2 gives, for
+nodes i and j,
 
     gradient_i  = -P w_q o c_i n
     tangent_ij  =  P w_q (c_i c_j n n^T - o/d (c_i c_j (I - n n^T) - w_i w_j^T / m_ss)),  m_ss = u_s.u_s + u.u_ss
 
-where the last term stands only while the closest point is not a fibril's end.
+where the last term stands only while s is not a fibril's end. At a maximum of the distance w_q and m_ss are negative.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import compiled
 from circuittex.contact.curve import weights
 from circuittex.mech.pattern import find_neighbour
 
+LEAST_CURVATURE = 1e-8
+"""Of m_ss, in parts of u_s.u_s: where a minimum and a maximum meet m_ss vanishes and the tangent grows beyond bounds;
+that much of it leaves the digits of all the rest."""
+
+
+class Touches(NamedTuple):
+    """The C contact points, as compiled functions take them."""
+
+    interval_a: Ints
+    """(C,) interval that carries the contact point."""
+    t_a: Floats
+    """(C,) its local coordinate."""
+    interval_b: Ints
+    """(C,) interval of the other place."""
+    t_b: Floats
+    """(C,) its local coordinate."""
+    at_end: Any
+    """(C,) whether that is a fibril's end."""
+    overlap: Floats
+    """(C,) o, mm."""
+    stiffness: Floats
+    """(C,) P* times quadrature weight, N/mm; negative at a maximum of the distance."""
+
+
+class Rows(NamedTuple):
+    """Where the entries of a `Pattern` are."""
+
+    indptr: Ints
+    start: Ints
+    neighbour: Ints
+    point_offset: Ints
+
+
+class Sums(NamedTuple):
+    """What contacts are added to."""
+
+    gradient: Floats
+    """(n_dofs,), N."""
+    data: Floats
+    """(nnz,) tangent, N/mm."""
+    softening: Floats
+    """(nnz,) the part of it by which the contact force turns as fibrils slide."""
+
+
+class _Pair(NamedTuple):
+    c: Floats
+    """(8,) weights of the nodes in u: those of the lower window, then those of the higher that it does not hold."""
+    cs: Floats
+    """(8,) their derivatives."""
+    w: Floats
+    """(8, 3)."""
+    n: Floats
+    """(3,)."""
+    spread: Floats
+    """(3, 3) P w_q n n^T."""
+    turned: Floats
+    """(3, 3) -P w_q o/d (I - n n^T)."""
+    scratch: Floats
+    """(6, 4) weights in either window and their derivatives."""
+
 
 @compiled
-def _couple(r: Any, wa: int, wb: int, c: Any, cs: Any, css: Any, w: Any, n: Any, at_end: bool) -> tuple[float, float]:
-    """Fill n (3,) and w (8, 3) of one contact; return the distance and 1 / m_ss (0 at a fibril's end)."""
-    u, us, uss = np.zeros(3), np.zeros(3), np.zeros(3)
-    for i in range(8):
-        node = wa + i if i < 4 else wb + i - 4
-        for k in range(3):
-            u[k] += c[i] * r[node, k]
-            us[k] += cs[i] * r[node, k]
-            uss[k] += css[i] * r[node, k]
-    d = np.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
-    m = 0.0
+def _couple(curve: Any, touches: Any, q: int, apart: int, pair: Any) -> tuple[float, float]:
+    """Fill c, cs, w and n of one contact, whose windows begin `apart` nodes apart; the distance and 1 / m_ss.
+
+    The latter is 0 at a fibril's end; windows with common nodes have `apart` < 4.
+    """
+    a, b, r, part = touches.interval_a[q], touches.interval_b[q], curve.r, pair.scratch
+    weights(curve.basis[curve.kind[a]], touches.t_a[q], 0, part[0])
+    for order in range(3):
+        weights(curve.basis[curve.kind[b]], touches.t_b[q], order, part[1 + order])
+    wa, wb = curve.window[a], curve.window[b]
+    square, speed, m = 0.0, 0.0, 0.0
+    u, us = part[4], part[5]
     for k in range(3):
-        n[k] = u[k] / d
-        m += us[k] * us[k] + u[k] * uss[k]
+        u[k], us[k], uss = 0.0, 0.0, 0.0
+        for i in range(4):
+            u[k] += part[0, i] * r[wa + i, k]
+        for i in range(4):
+            u[k] -= part[1, i] * r[wb + i, k]
+            us[k] -= part[2, i] * r[wb + i, k]
+            uss -= part[3, i] * r[wb + i, k]
+        square += u[k] * u[k]
+        speed += us[k] * us[k]
+        m += us[k] * us[k] + u[k] * uss
+    d = np.sqrt(square)
+    first, second = (0, apart) if wa <= wb else (apart, 0)
+    pair.c[:], pair.cs[:] = 0.0, 0.0
+    for i in range(4):
+        pair.c[first + i] += part[0, i]
+    for i in range(4):
+        pair.c[second + i] -= part[1, i]
+        pair.cs[second + i] -= part[2, i]
+    for k in range(3):
+        pair.n[k] = u[k] / d
         for i in range(8):
-            w[i, k] = c[i] * us[k] + cs[i] * u[k]
-    return d, 0.0 if at_end or m <= 0.0 else 1.0 / m
+            pair.w[i, k] = pair.c[i] * us[k] + pair.cs[i] * u[k]
+    if touches.at_end[q]:
+        return d, 0.0
+    sign = np.copysign(1.0, touches.stiffness[q])
+    return d, sign / max(sign * m, LEAST_CURVATURE * speed)
 
 
 @compiled
-def add_contacts(
-    first_node: int,
-    last_node: int,
-    r: Any,
-    basis: Any,
-    window_a: Any,
-    kind_a: Any,
-    t_a: Any,
-    window_b: Any,
-    kind_b: Any,
-    t_b: Any,
-    at_end: Any,
-    overlap: Any,
-    stiffness: Any,
-    indptr: Any,
-    start: Any,
-    neighbour: Any,
-    point_offset: Any,
-    total: Any,
-    data: Any,
-    softening: Any,
-) -> None:
+def add_contacts(first_node: int, last_node: int, curve: Any, touches: Any, rows: Any, sums: Any) -> None:
     """Add the gradient and the tangent's upper triangle of every contact (C) in place, in the rows of some nodes.
 
     These are first_node to last_node, the latter not included: threads that share out the nodes share no row.
 
-    The tangent's first part, P w_q c_i c_j n n^T, goes to data; the rest, by which the contact force turns as
-    fibrils slide, goes to softening.
-
-    stiffness (C,): P* times quadrature weight, N/mm; the matrix arguments are those of `Pattern`.
+    At a minimum of the distance the tangent's first part, P w_q c_i c_j n n^T, goes to data; the rest, by which the
+    contact force turns as fibrils slide, goes to softening, and so does all of it at a maximum.
     """
-    c, cs, css = np.zeros(8), np.zeros(8), np.zeros(8)
-    w, n, spread, turned = np.empty((8, 3)), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    for q in range(overlap.shape[0]):
+    pair = _Pair(
+        np.empty(8), np.empty(8), np.empty((8, 3)), np.empty(3), np.empty((3, 3)), np.empty((3, 3)), np.empty((6, 4))
+    )
+    for q in range(touches.overlap.shape[0]):
         # The lower window first: so the second node of each pair is the higher, a column right of the diagonal.
-        low, high = min(window_a[q], window_b[q]), max(window_a[q], window_b[q])
+        wa, wb = curve.window[touches.interval_a[q]], curve.window[touches.interval_b[q]]
+        low, high = min(wa, wb), max(wa, wb)
         if (low + 4 <= first_node or low >= last_node) and (high + 4 <= first_node or high >= last_node):
             continue
-        weights(basis[kind_a[q]], t_a[q], 0, c[:4])
-        for order, out in ((0, c), (1, cs), (2, css)):
-            weights(basis[kind_b[q]], t_b[q], order, out[4:])
-            for i in range(4, 8):
-                out[i] = -out[i]
-        d, over_m = _couple(r, window_a[q], window_b[q], c, cs, css, w, n, at_end[q])
-        stiff, lean = stiffness[q], stiffness[q] * overlap[q] / d
+        d, over_m = _couple(curve, touches, q, min(4, high - low), pair)
+        stiff, lean = touches.stiffness[q], touches.stiffness[q] * touches.overlap[q] / d
         for k in range(3):
             for m in range(3):
-                spread[k, m] = stiff * n[k] * n[m]
-                turned[k, m] = lean * (n[k] * n[m] - (k == m))
-        over_m *= lean
-        first, second = (0, 4) if low == window_a[q] else (4, 0)
-        for i in range(8):
-            mine, node = (first + i, low + i) if i < 4 else (second + i - 4, high + i - 4)
-            if not first_node <= node < last_node or (c[mine] == 0.0 and cs[mine] == 0.0):
+                spread, turned = stiff * pair.n[k] * pair.n[m], lean * (pair.n[k] * pair.n[m] - (k == m))
+                pair.spread[k, m] = spread if stiff > 0.0 else 0.0
+                pair.turned[k, m] = turned if stiff > 0.0 else turned + spread
+        _add(first_node, last_node, low, high, stiff * touches.overlap[q], over_m * lean, pair, rows, sums)
+
+
+@compiled
+def _add(
+    first_node: int, last_node: int, low: int, high: int, force: float, pull: float, pair: Any, rows: Any, sums: Any
+) -> None:
+    """Add one contact between the windows that begin at low and high: P w_q o and P w_q o / (d m_ss) as given."""
+    c, cs, w, n, apart = pair.c, pair.cs, pair.w, pair.n, min(4, high - low)
+    for i in range(4 + apart):
+        node = low + i if i < 4 else high + i - apart
+        if not first_node <= node < last_node or (c[i] == 0.0 and cs[i] == 0.0):
+            continue
+        across = find_neighbour(rows.start, rows.neighbour, node, high) if i < 4 == apart else 0
+        for k in range(3):
+            sums.gradient[9 * node + k] -= force * c[i] * n[k]
+            at = rows.indptr[9 * node + k]
+            for m in range(k, 3):
+                cc = c[i] * c[i]
+                sums.data[at + m - k] += cc * pair.spread[k, m]
+                sums.softening[at + m - k] += cc * pair.turned[k, m] + pull * w[i, k] * w[i, m]
+        for j in range(i + 1, 4 + apart):
+            if c[j] == 0.0 and cs[j] == 0.0:
                 continue
-            across = find_neighbour(start, neighbour, node, high) if i < 4 else 0
+            # Neighbours rise: those in the same window come first, and those in the other lie side by side.
+            there = rows.point_offset[across + j - 4 if i < 4 <= j and apart == 4 else rows.start[node] + j - i - 1]
+            cc = c[i] * c[j]
             for k in range(3):
-                total[9 * node + k] -= stiff * overlap[q] * c[mine] * n[k]
-                at = indptr[9 * node + k]
-                for m in range(k, 3):
-                    cc = c[mine] * c[mine]
-                    data[at + m - k] += cc * spread[k, m]
-                    softening[at + m - k] += cc * turned[k, m] + over_m * w[mine, k] * w[mine, m]
-            for j in range(i + 1, 8):
-                other = first + j if j < 4 else second + j - 4
-                if c[other] == 0.0 and cs[other] == 0.0:
-                    continue
-                # Neighbours rise: those in the same window come first, and those in the other lie side by side.
-                there = point_offset[across + j - 4 if i < 4 <= j else start[node] + j - i - 1]
-                cc = c[mine] * c[other]
-                for k in range(3):
-                    row, wk = indptr[9 * node + k] + 9 - k + there, over_m * w[mine, k]
-                    for m in range(3):
-                        data[row + m] += cc * spread[k, m]
-                        softening[row + m] += cc * turned[k, m] + wk * w[other, m]
+                row, wk = rows.indptr[9 * node + k] + 9 - k + there, pull * w[i, k]
+                for m in range(3):
+                    sums.data[row + m] += cc * pair.spread[k, m]
+                    sums.softening[row + m] += cc * pair.turned[k, m] + wk * w[j, m]

@@ -11,6 +11,9 @@ from circuittex.base.errors import DesignError
 from circuittex.base.frozen import frozen
 from circuittex.contact.state import ContactState
 
+MOST_EMPTY, MOST_BINS = 3, 6
+"""Of bins of a quarter of the merge length: how many empty ones a run survives, and how many a contact stands for."""
+
 
 @frozen
 class Simplified:
@@ -39,9 +42,14 @@ def simplify(state: ContactState, *, merge_length: float, snap_length: float, dr
 
 
 def merge_contacts(state: ContactState, length: float) -> ContactState:
-    """One contact for all those of a fibril pair that fall into the same bin of `length` mm.
+    """One contact for all those of a fibril pair that lie together on both fibrils.
 
-    The bins lie along the lower-numbered fibril, which becomes fibril a, and take in both sides of the pair.
+    Along the lower-numbered fibril, which becomes fibril a, together is what falls into the same bin of `length` mm.
+    Of these, neighbours along the other are merged, whose bins are a quarter as long. A run of bins that hold
+    contacts ends where four are empty; one of up to six bins becomes one contact, and each bin of a longer one makes
+    its own. So what spans up to 5/4 `length` along the other fibril and lies alone is merged, and what spans more
+    than 3/2 never is. Both sides of the pair are taken in.
+
     Sums are kept: conductances and weights, and weighted by them contact area (width), force (line load) and
     gap; so G = sigma_c a w [31] still holds. The feet are means weighted by contact area. The result is
     ordered by pair and coordinate and does not depend on the order of the contacts, nor on which fibril of a
@@ -53,12 +61,11 @@ def merge_contacts(state: ContactState, length: float) -> ContactState:
     if not state.n_contacts:
         return state
     state = _take(_lower_first(state), _canonical_order(_lower_first(state)))
-    bins = np.floor(state.xi_a / length)
-    same = (np.diff(state.fibril_a) == 0) & (np.diff(state.fibril_b) == 0) & (np.diff(bins) == 0)
-    start = np.flatnonzero(np.concatenate([[True], ~same]))
+    group, start = _together(state, length)
+    state = _take(state, np.argsort(group, kind="stable"))
     weight = np.add.reduceat(state.weight, start)
     area = state.width * state.weight
-    return replace(
+    merged = replace(
         state,
         fibril_a=state.fibril_a[start],
         fibril_b=state.fibril_b[start],
@@ -71,6 +78,23 @@ def merge_contacts(state: ContactState, length: float) -> ContactState:
         conductance=np.add.reduceat(state.conductance, start),
         heat_conductance=np.add.reduceat(state.heat_conductance, start),
     )
+    return _take(merged, _canonical_order(merged))
+
+
+def _together(state: ContactState, length: float) -> tuple[Ints, Ints]:
+    """The group (C,) of each contact, numbered from 0, and where each group starts once they are sorted by it."""
+    bin_a, bin_b = np.floor(state.xi_a / length), np.floor(4 * (state.xi_b / length))
+    order = np.lexsort([bin_b, bin_a, state.fibril_b, state.fibril_a])
+    apart = [np.diff(column[order]) != 0 for column in (state.fibril_a, state.fibril_b, bin_a)]
+    bin_b = bin_b[order]
+    step = np.diff(bin_b)
+    run_starts = np.concatenate([[True], np.logical_or.reduce([*apart, step > MOST_EMPTY + 1])])
+    run, at = np.cumsum(run_starts) - 1, np.flatnonzero(run_starts)
+    bins = bin_b[np.append(at[1:], len(order)) - 1] - bin_b[at] + 1
+    own = run_starts | (np.concatenate([[True], step != 0]) & (bins[run] > MOST_BINS))
+    group = np.empty(len(order), dtype=np.int64)
+    group[order] = np.cumsum(own) - 1
+    return group, np.flatnonzero(own)
 
 
 def snap_feet(state: ContactState, length: float) -> tuple[ContactState, int]:

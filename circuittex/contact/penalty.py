@@ -5,17 +5,19 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import cores, side_by_side
 from circuittex.base.errors import PenetrationError
 from circuittex.base.frozen import frozen
-from circuittex.contact.closest import find_contacts
-from circuittex.contact.curve import BASIS, CurveTable, bezier, curve_table
-from circuittex.contact.kernels import add_contacts
+from circuittex.contact.closest import Fibrils, Found, find_contacts
+from circuittex.contact.curve import CurveTable, curve_table, curve_through
+from circuittex.contact.hull import QUARTER, hulls
+from circuittex.contact.kernels import Rows, Sums, Touches, add_contacts
 from circuittex.contact.law import pair_penalty
 from circuittex.contact.passing import PRESSED, likely_cause, safe_step
-from circuittex.contact.search import CONTROL_MOTION, Candidates, coupled_nodes, find_candidates
+from circuittex.contact.search import CONTROL_MOTION, Candidates, bent_back, coupled_nodes, find_candidates
 from circuittex.design import ContactLaw
 from circuittex.geometry.mesh import FibrilMesh, pair_label
 from circuittex.mech.pattern import Pattern
@@ -25,6 +27,9 @@ WORTH_A_THREAD = 2000
 SKIN = 8 / 15
 """How far candidates reach beyond touch, in parts of the smallest radius: they last for as long as nothing moves by
 about a quarter of it."""
+LIKELY = 2 / 3 * QUARTER
+"""Where a fibril turns by as much on its way from one stretch of it to another, the pattern has room for their contact:
+it can come only once that has become a quarter."""
 CHUNKS = 16
 """Candidates are searched in this many pieces, whatever the number of threads."""
 
@@ -38,11 +43,13 @@ class Touching:
     t_a: Floats
     """(C,) its local coordinate in [0, 1]."""
     fibril_b: Ints
-    """(C,) the other fibril."""
+    """(C,) the other fibril, or the same."""
     position_b: Floats
-    """(C,) closest position on it, in nodes."""
+    """(C,) place on it, in nodes, where the distance has a minimum or a maximum."""
     overlap: Floats
     """(C,) R + R' - |d| > 0, mm [26]."""
+    sign: Floats
+    """(C,) 1 at a minimum of the distance, -1 at a maximum."""
 
 
 def contact_points(mesh: FibrilMesh, per_element: int) -> Floats:
@@ -62,6 +69,9 @@ def contact_points(mesh: FibrilMesh, per_element: int) -> Floats:
 class PenaltyContact:
     """Energy sum over contact points of 1/2 P* w o^2; both fibrils of a pair carry points, with half weight.
 
+    A point counts with each minimum of the distance to a fibril, its own included, less the maxima between them: so
+    that the energy stays smooth where minima appear, merge and vanish.
+
     `law` gives P* of each pair (`pair_penalty`), `per_element` is the number of contact points of an element, `skin`
     (mm) how far candidates reach beyond touch so that they last several iterations, by default `SKIN`.
     """
@@ -73,10 +83,13 @@ class PenaltyContact:
         self.points = contact_points(mesh, per_element)
         size = mesh.length / np.diff(mesh.first_element) / per_element
         self.weight = size / 2  # half: the pair is integrated from both sides
+        self.fibrils = Fibrils(mesh.radius, mesh.first_node, self.table.first_interval, self.table.fibril)
         self._held: tuple[Candidates, Floats] | None = None
         """What the pattern has room for, and the nodes (N, 3) for which it was searched."""
         self._tried: tuple[Candidates, Floats] | None = None
         """The same for a trial outside the reach of what is held."""
+        self._own: NDArray[np.bool_] = np.empty(0, dtype=np.bool_)
+        """(rows,) the stretches of its own fibril that the pattern has room for, of those held."""
         self._last: tuple[Floats, Touching] | None = None
 
     def positions(self, q: Floats) -> Floats:
@@ -84,9 +97,13 @@ class PenaltyContact:
         return np.ascontiguousarray(q.reshape(-1, 9)[:, :3])
 
     def prepare(self, q: Floats) -> bool:
-        """Renew the candidates once a Bézier point may have moved by half the skin."""
-        held = self._near(self.positions(q))
-        renewed, self._held = held is not self._held, held
+        """Renew the candidates once a Bézier point may have moved by half the skin, or a fibril bends back anew."""
+        r = self.positions(q)
+        held = self._near(r)
+        turn = hulls(curve_through(self.table, r)).turn
+        renewed = held is not self._held or bool(np.any(bent_back(self.table, held[0], turn, QUARTER) & ~self._own))
+        if renewed:
+            self._held, self._own = held, bent_back(self.table, held[0], turn, LIKELY)
         return renewed
 
     def _near(self, r: Floats) -> tuple[Candidates, Floats]:
@@ -102,14 +119,14 @@ class PenaltyContact:
     def pairs(self) -> tuple[Ints, Ints]:
         """Node pairs that the present candidates can couple, positions only."""
         assert self._held is not None, "prepare comes first"
-        return np.empty((0, 2), dtype=np.int64), coupled_nodes(self.table, self._held[0])
+        return np.empty((0, 2), dtype=np.int64), coupled_nodes(self.table, self._held[0], self._own)
 
     def touching(self, q: Floats) -> Touching:
         """All contact points that overlap at q; candidates are searched for it if q lies outside their reach."""
         if self._last is not None and np.array_equal(self._last[0], q):
             return self._last[1]
         r = self.positions(q)
-        found = _search(self.mesh, self.table, self.points, self._near(r)[0], r)
+        found = self._search(self._near(r)[0], r)
         self._last = q.copy(), found
         return found
 
@@ -118,10 +135,36 @@ class PenaltyContact:
         found = self.touching(q)
         return float(0.5 * np.sum(self._stiffness(found) * found.overlap**2))
 
+    def _search(self, candidates: Candidates, r: Floats) -> Touching:
+        """The places of all candidates, in pieces on all cores; the result does not depend on their number."""
+        table, points = self.table, self.points
+        curve = curve_through(table, r)
+        hull = hulls(curve)
+        edges = np.linspace(0, len(candidates.interval), CHUNKS + 1).astype(int)
+
+        def piece(first: int, last: int) -> Found:
+            rows = Candidates(*(column[first:last] for column in candidates))
+            found = find_contacts(curve, hull, self.fibrils, points, rows, points.shape[1] * (last - first))
+            return found._replace(row=found.row + first)
+
+        with ThreadPoolExecutor(cores()) as pool:
+            pieces = list(pool.map(piece, edges[:-1], edges[1:]))
+        found = Found(*map(np.concatenate, zip(*pieces, strict=True)))
+        interval = candidates.interval[found.row]
+        first = table.first_interval[table.fibril[interval]]
+        return Touching(
+            interval_a=interval,
+            t_a=points[(interval - first) % len(points), found.point],
+            fibril_b=candidates.fibril[found.row],
+            position_b=found.position,
+            overlap=found.overlap,
+            sign=found.sign,
+        )
+
     def _stiffness(self, found: Touching) -> Floats:
-        """(C,) P* w of each contact point, N/mm."""
+        """(C,) P* w of each contact point, N/mm; negative at a maximum of the distance."""
         a = self.table.fibril[found.interval_a]
-        return np.asarray(pair_penalty(self.mesh, self.law, a, found.fibril_b) * self.weight[a])
+        return np.asarray(found.sign * pair_penalty(self.mesh, self.law, a, found.fibril_b) * self.weight[a])
 
     def longest(self, q: Floats, direction: Floats) -> float:
         """The part of `direction` that the centre lines can go without colliding (`safe_step`).
@@ -140,32 +183,20 @@ class PenaltyContact:
         found, table = self.touching(q), self.table
         last = table.first_interval[found.fibril_b + 1] - table.first_interval[found.fibril_b]
         k = np.minimum(found.position_b.astype(np.int64), last - 1)
-        b = table.first_interval[found.fibril_b] + k
-        stiffness = self._stiffness(found)
-        window_a, window_b = table.window[found.interval_a], table.window[b]
-        side_by_side(
-            add_contacts,
-            self._shares(window_a, window_b),
-            self.positions(q),
-            BASIS,
-            window_a,
-            table.kind[found.interval_a],
-            found.t_a,
-            window_b,
-            table.kind[b],
-            found.position_b - k,
-            (found.position_b <= 0) | (found.position_b >= last),
-            found.overlap,
-            stiffness,
-            pattern.indptr,
-            pattern.neighbour_start,
-            pattern.neighbour,
-            pattern.point_offset,
-            gradient,
-            data,
-            softening,
+        touches = Touches(
+            interval_a=found.interval_a,
+            t_a=found.t_a,
+            interval_b=table.first_interval[found.fibril_b] + k,
+            t_b=found.position_b - k,
+            at_end=(found.position_b <= 0) | (found.position_b >= last),
+            overlap=found.overlap,
+            stiffness=self._stiffness(found),
         )
-        return float(0.5 * np.sum(stiffness * found.overlap**2))
+        shares = self._shares(table.window[touches.interval_a], table.window[touches.interval_b])
+        rows = Rows(pattern.indptr, pattern.neighbour_start, pattern.neighbour, pattern.point_offset)
+        sums = Sums(gradient, data, softening)
+        side_by_side(add_contacts, shares, curve_through(table, self.positions(q)), touches, rows, sums)
+        return float(0.5 * np.sum(touches.stiffness * found.overlap**2))
 
     def _shares(self, window_a: Ints, window_b: Ints) -> list[int]:
         """Nodes that part the rows of the matrix into as many pieces as there are cores for, of much the same work."""
@@ -176,46 +207,3 @@ class PenaltyContact:
         work = np.cumsum(3 * np.bincount(low, minlength=n) + np.bincount(high, minlength=n))
         inner = np.searchsorted(work, work[-1] * np.arange(1, pieces) / pieces) + 1
         return [0, *np.minimum(inner, n).tolist(), n]
-
-
-def _search(mesh: FibrilMesh, table: CurveTable, points: Floats, candidates: Candidates, r: Floats) -> Touching:
-    """Closest points of all candidates, in pieces on all cores; the result does not depend on their number."""
-    hull = bezier(table, r)
-    thirds = hull[:, :1] + np.array([[1.0], [2.0]]) / 3 * (hull[:, 3:] - hull[:, :1])
-    bulge = 0.75 * np.sqrt(((hull[:, 1:3] - thirds) ** 2).sum(axis=2)).max(axis=1)
-    shape = (len(candidates.interval), points.shape[1])
-    position, overlap = np.zeros(shape), np.empty(shape)
-
-    def piece(part: slice) -> None:
-        find_contacts(
-            r,
-            mesh.radius,
-            BASIS,
-            table.window,
-            table.kind,
-            table.first_interval,
-            mesh.first_node,
-            table.fibril,
-            bulge,
-            points,
-            candidates.interval[part],
-            candidates.fibril[part],
-            candidates.first[part],
-            candidates.last[part],
-            position[part],
-            overlap[part],
-        )
-
-    edges = np.linspace(0, shape[0], CHUNKS + 1).astype(int)
-    with ThreadPoolExecutor(cores()) as pool:
-        list(pool.map(piece, map(slice, edges[:-1], edges[1:])))
-    row, p = np.nonzero(overlap > 0)
-    interval = candidates.interval[row]
-    first = table.first_interval[table.fibril[interval]]
-    return Touching(
-        interval_a=interval,
-        t_a=points[(interval - first) % len(points), p],
-        fibril_b=candidates.fibril[row],
-        position_b=position[row, p],
-        overlap=overlap[row, p],
-    )

@@ -6,11 +6,13 @@ whose spheres or boxes are further apart than the reach cannot touch; all others
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from circuittex.base.arrays import Floats, Ints
-from circuittex.base.frozen import frozen
 from circuittex.contact.curve import CurveTable, bezier
 from circuittex.mech.pattern import distinct
 from circuittex.solvers.ranges import ranges
@@ -19,9 +21,11 @@ CONTROL_MOTION = 4 / 3
 """A Bézier point moves at most this times as far as the nodes that define it (the sum of its weights' magnitudes)."""
 
 
-@frozen
-class Candidates:
-    """Rows (interval of one fibril, another fibril, the range of its intervals that may be in reach)."""
+class Candidates(NamedTuple):
+    """Rows (interval of one fibril, another or the same one, a range of its intervals that may be in reach).
+
+    Where an interval is near several stretches of a fibril, each has a row.
+    """
 
     interval: Ints
     fibril: Ints
@@ -31,9 +35,9 @@ class Candidates:
 
 
 def find_candidates(table: CurveTable, r: Floats, radius: Floats, skin: float) -> Candidates:
-    """All (interval, other fibril) that come within R + R' + skin of one another; both directions.
+    """All (interval, fibril) that come within R + R' + skin of one another; both directions.
 
-    r (N, 3) nodes, mm; radius (F,) mm; skin mm.
+    r (N, 3) nodes, mm; radius (F,) mm; skin mm. Each interval is near itself.
     """
     hull = bezier(table, r)
     low, high = hull.min(axis=1), hull.max(axis=1)
@@ -42,26 +46,40 @@ def find_candidates(table: CurveTable, r: Floats, radius: Floats, skin: float) -
     thick = radius[table.fibril] + skin / 2
     pairs = cKDTree(centre).query_pairs(2 * float((ball + thick).max()), output_type="ndarray")
     i, j = pairs[:, 0], pairs[:, 1]
-    near = table.fibril[i] != table.fibril[j]
-    near &= ((centre[i] - centre[j]) ** 2).sum(axis=1) <= (ball[i] + ball[j] + thick[i] + thick[j]) ** 2
+    near = ((centre[i] - centre[j]) ** 2).sum(axis=1) <= (ball[i] + ball[j] + thick[i] + thick[j]) ** 2
     i, j = i[near], j[near]
     apart = np.maximum(0.0, np.maximum(low[i] - high[j], low[j] - high[i]))
     near = (apart**2).sum(axis=1) <= (thick[i] + thick[j]) ** 2
-    i, j = np.concatenate([i[near], j[near]]), np.concatenate([j[near], i[near]])
+    itself = np.arange(len(hull))
+    i, j = np.concatenate([i[near], j[near], itself]), np.concatenate([j[near], i[near], itself])
     order = np.lexsort((j, i))
     i, j = i[order], j[order]
-    key = i * len(radius) + table.fibril[j]
-    start = np.flatnonzero(np.diff(key, prepend=-1))
-    if len(start) == 0:
-        none = np.empty(0, dtype=np.int64)
-        return Candidates(interval=none, fibril=none, first=none, last=none)
-    end = np.append(start[1:], len(key)) - 1
-    return Candidates(interval=i[start], fibril=table.fibril[j[start]], first=j[start], last=j[end])
+    fibril = table.fibril[j]
+    start = np.flatnonzero(
+        (np.diff(i, prepend=-1) != 0) | (np.diff(j, prepend=-2) != 1) | (np.diff(fibril, prepend=0) != 0)
+    )
+    end = np.append(start[1:], len(i)) - 1
+    return Candidates(interval=i[start], fibril=fibril[start], first=j[start], last=j[end])
 
 
-def coupled_nodes(table: CurveTable, candidates: Candidates) -> Ints:
-    """(P, 2) node pairs that contact between the candidates can couple, windows included."""
+def bent_back(table: CurveTable, candidates: Candidates, turn: Floats, angle: float) -> NDArray[np.bool_]:
+    """(rows,) where a fibril may turn by `angle` or more between an interval and a stretch of its own.
+
+    turn (I + 1,) as `Hull.turn`. Where it turns by less than a quarter it cannot touch itself.
+    """
+    i, first, last = candidates.interval, candidates.first, candidates.last
+    most = np.maximum(turn[last + 1] - turn[i], turn[i + 1] - turn[first])
+    return np.asarray((table.fibril[i] == candidates.fibril) & (most >= angle))
+
+
+def coupled_nodes(table: CurveTable, candidates: Candidates, own: NDArray[np.bool_]) -> Ints:
+    """(P, 2) node pairs that contact between the candidates can couple, windows included.
+
+    own (rows,): which of the stretches of an interval's own fibril are to be coupled.
+    """
     window = table.window
+    rows = np.flatnonzero(own | (table.fibril[candidates.interval] != candidates.fibril))
+    candidates = Candidates(*(column[rows] for column in candidates))
     start, stop = window[candidates.first], window[candidates.last] + 4
     count = stop - start
     n = int(window.max()) + 4

@@ -11,7 +11,8 @@ from circuittex.geometry.mesh import FibrilMesh
 class ContactState:
     """All contact points of one mechanical state, and how the fibrils conduct along their axes.
 
-    Each of the C rows is one contact point: a point of fibril a and its closest point on fibril b.
+    Each of the C rows is one contact: a point of fibril a and a place on fibril b, or on fibril a itself, where the
+    distance has a minimum. From one point there may be several.
     Contacts are integrated over both fibrils, so a touching pair appears from both sides, each
     with half its quadrature weight.
     """
@@ -21,7 +22,7 @@ class ContactState:
     fibril_a: Ints
     """(C,) fibril that carries the quadrature point."""
     fibril_b: Ints
-    """(C,) fibril that carries the closest point."""
+    """(C,) fibril that carries the place of the minimum."""
     xi_a: Floats
     """(C,) axis coordinate on fibril a, mm."""
     xi_b: Floats
@@ -33,7 +34,7 @@ class ContactState:
     width: Floats
     """(C,) Hertz half-width a [29], mm."""
     weight: Floats
-    """(C,) quadrature weight w, mm of axis (already halved)."""
+    """(C,) quadrature weight w, mm of axis (already halved; of minima that belong together each has a part)."""
     conductance: Floats
     """(C,) electrical conductance sigma_c a w [31], S."""
     heat_conductance: Floats

@@ -134,7 +134,7 @@ class Weave:
     """Distance of neighbouring yarn axes in both directions, mm."""
     amplitude: float = field(
         metadata=number(
-            "mm", "height H of a yarn axis above or below the mid-plane at a crossing", shown="0.525 mm", at_least=0
+            "mm", "height H of a yarn axis above or below the mid-plane at a crossing", shown="0.46 mm", at_least=0
         )
     )
     """Height H of a yarn axis above or below the mid-plane at a crossing, mm."""
@@ -230,7 +230,7 @@ class ContactProperties:
         metadata=number(
             "N/mm2",
             'P* > 0: force per mm of axis and mm of overlap; or "hertz": E*/2 of each pair of materials',
-            shown="5 N/mm2",
+            shown=HERTZ,
             above=0,
             words=(HERTZ,),
         )

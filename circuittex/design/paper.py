@@ -53,5 +53,5 @@ def plain_weave(
         tuple(loading),
         tuple(terminals),
         probes,
-        numerics=Numerics(elements=Numerics.elements * max(4, yarns) // 4),
+        numerics=Numerics(elements=5 * max(4, yarns)),
     )

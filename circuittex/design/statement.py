@@ -12,6 +12,7 @@ from circuittex.design.declaration import check, choice, count, flag, number, re
 from circuittex.design.experiment import Loading, Probe, Terminal
 from circuittex.design.fabric import ContactLaw, Weave
 from circuittex.design.packing import Packing
+from circuittex.design.resolution import Resolution, resolution
 from circuittex.design.units import parse
 
 FORMAT = 1
@@ -71,12 +72,23 @@ class Numerics:
     20
     """
 
-    elements: int = field(default=20, metadata=count("of each fibril, at least 2", 2, 10_000, shown="20"))
-    """Elements of each fibril."""
+    elements: int | str = field(
+        default=20,
+        metadata=count(
+            'of each fibril, at least 2; "auto": as its bends and contacts ask for',
+            2,
+            10_000,
+            shown=AUTO,
+            words=(AUTO,),
+        ),
+    )
+    """Elements of each fibril, or 'auto' (`Design.resolution`)."""
     order: int = field(default=2, metadata=count("of the elements, 1 or 2", 1, 2, shown="2"))
     """Polynomial order of the elements, 1 or 2."""
-    contact_points: int = field(default=4, metadata=count("of each element, 1 to 20", 1, 20, shown="4"))
-    """Contact points of each element, on either side."""
+    contact_points: int | str = field(
+        default=4, metadata=count('of each element, 1 to 20; "auto"', 1, 20, shown=AUTO, words=(AUTO,))
+    )
+    """Contact points of each element, on either side, or 'auto' (`Design.resolution`)."""
     section_degree: int = field(
         default=7, metadata=count("of the quadrature rule over the section, 6 to 15", 6, 15, shown="7")
     )
@@ -217,10 +229,19 @@ class Design:
         self._check_terminals()
         self._check_probes()
 
+    @property
+    def resolution(self) -> Resolution:
+        """Elements of each fibril and contact points of each element, those that are 'auto' from the fibrils."""
+        numerics = self.numerics
+        elements = numerics.elements if isinstance(numerics.elements, int) else None
+        wanted = resolution(self.weave, self.contact, numerics.order, elements)
+        points = numerics.contact_points
+        return Resolution(wanted.elements, points if isinstance(points, int) else wanted.contact_points)
+
     def _check_size(self) -> None:
         fibrils = sum(yarn.n_fibrils for yarn in self.weave.yarns)
         crossings = max(len(self.weave.warp), len(self.weave.weft))
-        elements, order = self.numerics.elements, self.numerics.order
+        elements, order = self.resolution.elements, self.numerics.order
         if fibrils * elements > MOST_ELEMENTS:
             allowed = f"{fibrils} fibrils of that many elements exceed {MOST_ELEMENTS} elements in all"
             raise refuse("numerics.elements", elements, allowed)
@@ -249,7 +270,7 @@ class Design:
     def _largest_snap(self) -> float:
         """A tenth of the shortest element, mm."""
         shortest = min(len(self.weave.warp), len(self.weave.weft)) * self.weave.pitch
-        return shortest / self.numerics.elements / 10
+        return shortest / self.resolution.elements / 10
 
     @property
     def merge_length(self) -> float:

@@ -28,11 +28,12 @@ def build_mesh(design: Design) -> FibrilMesh:
     weave, numerics = design.weave, design.numerics
     check_overlaps(weave, design.packing)
     check_order(weave, design.packing)
-    n_nodes = numerics.order * numerics.elements + 1
+    elements = design.resolution.elements
+    n_nodes = numerics.order * elements + 1
     lines = centre_lines(weave, n_nodes, design.packing)
     n_fibrils = len(lines.yarn)
     first_node = np.arange(n_fibrils + 1) * n_nodes
-    within = np.arange(numerics.elements)[:, None] * numerics.order + np.arange(numerics.order + 1)
+    within = np.arange(elements)[:, None] * numerics.order + np.arange(numerics.order + 1)
     materials = [material for kind in weave.yarns for material in kind.materials]
     names = list(dict.fromkeys(material.name for material in materials))
     return FibrilMesh(
@@ -41,7 +42,7 @@ def build_mesh(design: Design) -> FibrilMesh:
         xi=lines.xi.reshape(-1),
         elements=(first_node[:-1, None, None] + within).reshape(-1, numerics.order + 1),
         first_node=first_node,
-        first_element=np.arange(n_fibrils + 1) * numerics.elements,
+        first_element=np.arange(n_fibrils + 1) * elements,
         yarn=lines.yarn,
         length=lines.length,
         radius=np.array([kind.radius for kind in weave.yarns])[lines.yarn],

@@ -45,7 +45,7 @@ def force_terms(mesh: FibrilMesh, design: Design, free: str = "") -> tuple[BeamS
     numerics = design.numerics
     space = beam_space(mesh, free)
     beam = Beam(space, degree=numerics.section_degree)
-    contact = PenaltyContact(mesh, law=design.contact, per_element=numerics.contact_points)
+    contact = PenaltyContact(mesh, law=design.contact, per_element=design.resolution.contact_points)
     return space, beam, contact
 
 

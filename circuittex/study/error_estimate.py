@@ -54,7 +54,7 @@ def variants(design: Design) -> tuple[Design, Design, Design]:
     >>> [(d.numerics.elements, d.numerics.contact_points) for d in variants(plain_weave())]
     [(10, 4), (40, 4), (20, 8)]
     """
-    elements, points = design.numerics.elements, design.numerics.contact_points
+    elements, points = design.resolution.elements, design.resolution.contact_points
     if elements % 2:
         raise DesignError("numerics.elements", elements, "an error estimate halves it: it must be even")
     coarse, fine = (_varied(design, "elements", n) for n in (elements // 2, 2 * elements))
@@ -95,7 +95,7 @@ def estimate_error(
         repeats.append(_repeat(other, mesh, record.configuration, free, solver()))
     own = _values(record.outcome)
     rows = zip(_names(design), own, *(repeat.values for repeat in repeats), strict=True)
-    elements, points = design.numerics.elements, design.numerics.contact_points
+    elements, points = design.resolution.elements, design.resolution.contact_points
     return ErrorEstimate(
         state=record.name,
         elements=(elements // 2, elements, 2 * elements),

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from circuittex.base.errors import CircuitError, ConvergenceError
+from circuittex.base.errors import CircuitError, ConvergenceError, PenetrationError
 from circuittex.contact.extract import contacts_of
 from circuittex.design import Design, Terminal
 from circuittex.electrical.fields import Fields, solve_probes
@@ -45,7 +45,7 @@ def reach(
     stored states finds what an uninterrupted one does. `say` is told of the progress, with a line break at the end of
     what should stay on the screen.
 
-    Raises `ConvergenceError`, naming the state.
+    Raises `ConvergenceError`, naming the state and what to change.
     """
     mesh, design = study.mesh, study.design
 
@@ -68,7 +68,17 @@ def reach(
             say=lambda text: say(f"{step.name}: {text}\n"),
         )
     except ConvergenceError as error:
-        raise type(error)(f"{step.name}: {error}", error.history) from error
+        raise type(error)(f"{step.name}: {error}{_way_out(design, error)}", error.history) from error
+
+
+def _way_out(design: Design, error: ConvergenceError) -> str:
+    """What to change where no route leads to an equilibrium; nothing where the error says why there is none."""
+    if isinstance(error, PenetrationError):
+        return ""
+    if len(error.history) > design.numerics.max_iterations:
+        return f"; raise numerics.max_iterations above {design.numerics.max_iterations} or load in smaller steps"
+    other = f"another number of numerics.elements than {design.numerics.elements}"
+    return f"; try {other}, a larger numerics.tolerance or smaller steps"
 
 
 def record_state(study: Study, step: Step, reached: Increment, say: Callable[[str], None]) -> Record:

@@ -43,7 +43,7 @@ class Fit:
     """Resistance of a crossing, ohm; inf where no probe that crosses between yarns carries current, nan where the
     probes do not tell."""
     residual: float
-    """Root of the sum of squared misfits: relative ('relative') or in A ('absolute'); nan without probes."""
+    """Root of the sum of squared misfits: relative ('relative') or in A ('absolute') [1 or A]; nan without probes."""
     covariance: Floats
     """(2, 2) of Ry and Rc, ohm2, from the misfit with two degrees of freedom spent; inf where nothing tells."""
     weighting: str

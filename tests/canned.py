@@ -19,9 +19,9 @@ from circuittex.results.records import Record, Study
 from circuittex.study.plan import Step, plan
 
 
-def canned_study(states: int = 3, paths: tuple[str, ...] = ("stretch", "shear")) -> Study:
-    """The relaxed state and `states` - 1 on each path, named as a run names them."""
-    study = synthetic_study(states, contacts=10, rows=(1,), paths=paths)
+def canned_study(states: int = 3, loadings: tuple[str, ...] = ("stretch", "shear")) -> Study:
+    """The relaxed state and `states` - 1 on each loading, named as a run names them."""
+    study = synthetic_study(states, contacts=10, rows=(1,), loadings=loadings)
     steps = plan(study.design)
     records = tuple(
         replace(record, name=step.name, netlist=f"netlists/{step.name}.sub")

@@ -26,15 +26,15 @@ def synthetic_study(
     *,
     contacts: int = 300,
     rows: tuple[int, ...] = (3, 4, 3),
-    paths: tuple[str, ...] = ("stretch",),
+    loadings: tuple[str, ...] = ("stretch",),
     name: str = "made-up weave",
     seed: int = 0,
 ) -> Study:
-    """The relaxed state and `states` - 1 strained ones on each of `paths`, with `contacts` contact points each."""
+    """The relaxed state and `states` - 1 strained ones on each of `loadings`, with `contacts` contact points each."""
     rng = np.random.default_rng(seed)
     strains = tuple(0.025 * step for step in range(1, states))
     loading = tuple(
-        Loading(path, tuple(_gradient(path, strain) for strain in strains), strains) for path in paths if strains
+        Loading(each, tuple(_gradient(each, strain) for strain in strains), strains) for each in loadings if strains
     )
     design = plain_weave(rows=rows, loading=loading)
     design = Design(
@@ -49,7 +49,7 @@ def synthetic_study(
     )
     mesh = build_mesh(design)
     records = [_record(design, mesh, "", 0.0, contacts, rng)]
-    records += [_record(design, mesh, path, strain, contacts, rng) for path in paths for strain in strains]
+    records += [_record(design, mesh, each, strain, contacts, rng) for each in loadings for strain in strains]
     return Study(
         version="0.0.0",
         design=design,
@@ -60,25 +60,25 @@ def synthetic_study(
     )
 
 
-def _gradient(path: str, strain: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    return ((1.0, 0.0), (strain, 1.0)) if path == "shear" else ((1.0 + strain, 0.0), (0.0, 1.0))
+def _gradient(loading: str, strain: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    return ((1.0, 0.0), (strain, 1.0)) if loading == "shear" else ((1.0 + strain, 0.0), (0.0, 1.0))
 
 
 def _record(
-    design: Design, mesh: FibrilMesh, path: str, strain: float, contacts: int, rng: np.random.Generator
+    design: Design, mesh: FibrilMesh, loading: str, strain: float, contacts: int, rng: np.random.Generator
 ) -> Record:
-    gradient = np.array(_gradient(path, strain))
-    slope = 4.0 if path == "shear" else 18.0
+    gradient = np.array(_gradient(loading, strain))
+    slope = 4.0 if loading == "shear" else 18.0
     state = _contacts(mesh, contacts, rng)
     clamp_force = np.array([[1.49 + slope * strain, 0.01, 0.002], [0.001, 1.49 + 2 * strain, -0.01]])
     return Record(
-        name=f"{path}-{strain:.4f}" if path else "relaxed",
-        path=path,
+        name=f"{loading}-{strain:.4f}" if loading else "relaxed",
+        loading=loading,
         strain=strain,
         gradient=gradient,
         configuration=_flattened(mesh, gradient),
         residual=3e-8,
-        iterations=52 if not path else 14,
+        iterations=52 if not loading else 14,
         parts=1,
         history=rng.random((5, 4)),
         clamp_force=clamp_force,
@@ -100,7 +100,7 @@ def _record(
             (len(design.weave.warp), len(design.weave.weft)),
         ),
         reduced_difference=3e-12,
-        field_convergence=np.empty((0, 2)) if path else np.array([[0.2, 4e-6], [0.1, 1e-6], [0.05, 2.5e-7]]),
+        field_convergence=np.empty((0, 2)) if loading else np.array([[0.2, 4e-6], [0.1, 1e-6], [0.05, 2.5e-7]]),
         levels=2,
         verification=Verification(
             routes=("fields", "nodal", "ngspice"),
@@ -116,7 +116,7 @@ def _record(
             ngspice_checked=True,
             note="",
         ),
-        netlist=f"netlists/{path or 'relaxed'}-{strain:.4f}.cir",
+        netlist=f"netlists/{loading or 'relaxed'}-{strain:.4f}.cir",
     )
 
 

@@ -15,7 +15,7 @@ from circuittex.design import plain_weave
 from circuittex.results.records import Study
 from circuittex.results.store import write_study_start
 
-CODE = synthetic_study(3, contacts=10, paths=("stretch", "shear"))
+CODE = synthetic_study(3, contacts=10, loadings=("stretch", "shear"))
 TABLE = replace(CODE, design=replace(CODE.design, weave=plain_weave("paper-table").weave))
 OTHER_CELL = replace(CODE, design=replace(CODE.design, weave=replace(CODE.design.weave, amplitude=0.5)))
 

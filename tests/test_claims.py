@@ -16,7 +16,7 @@ from circuittex.results.claims.claim import AGREES, Finding
 from circuittex.results.claims.table import claims_table
 from circuittex.results.records import Record, Study
 
-STUDY = synthetic_study(11, contacts=60, paths=("stretch", "shear"))
+STUDY = synthetic_study(11, contacts=60, loadings=("stretch", "shear"))
 Change = Callable[[Record], Record]
 
 
@@ -115,7 +115,7 @@ def factors(stretched: float, sheared: float) -> Change:
     size = {"": 1.0, "stretch": stretched, "shear": sheared}
 
     def change(record: Record) -> Record:
-        factor = np.full(len(STUDY.mesh.elements), size[record.path])
+        factor = np.full(len(STUDY.mesh.elements), size[record.loading])
         return replace(record, contacts=replace(record.contacts, axial_factor=factor))
 
     return change
@@ -193,7 +193,7 @@ CASES: list[tuple[Callable[..., Finding | None], Study, str]] = [
         "no",
     ),
     (currents.neighbours, changed(along_yarns(0.06)), "yes"),
-    (currents.neighbours, changed(lambda r: along_yarns(0.06 if r.path == "shear" else 0.04)(r)), "partly"),
+    (currents.neighbours, changed(lambda r: along_yarns(0.06 if r.loading == "shear" else 0.04)(r)), "partly"),
     (currents.neighbours, changed(along_yarns(0.04)), "no"),
     (currents.insulated, STUDY, "yes"),
     (currents.insulated, other_yarn(9.0), "no"),
@@ -204,16 +204,16 @@ CASES: list[tuple[Callable[..., Finding | None], Study, str]] = [
     (currents.first_is_highest, changed(probes(lambda r: [0.5, 4 * r.strain, 0.1])), "partly"),
     (currents.first_is_highest, changed(probes(lambda _: [0.1, 0.2, 0.3])), "no"),
     (currents.first_varies, changed(probes(lambda r: [1.0 + 0.4 * r.strain, 0.1, 0.1])), "yes"),
-    (currents.first_varies, changed(probes(lambda r: [1.0 + (r.path == "shear") * r.strain, 0.1, 0.1])), "partly"),
+    (currents.first_varies, changed(probes(lambda r: [1.0 + (r.loading == "shear") * r.strain, 0.1, 0.1])), "partly"),
     (currents.first_varies, changed(probes(lambda r: [1.0 + 0.04 * r.strain, 0.1, 0.1])), "no"),
     (currents.others_drop, changed(probes(wavy)), "yes"),
     (currents.others_drop, changed(probes(lambda r: [0.9, 0.01 + 0.01 * r.strain, 0.01])), "partly"),
     (currents.others_drop, changed(probes(lambda r: [0.9, 0.01 - 0.01 * r.strain, 0.01])), "no"),
     (currents.load_grows, changed(loads(lambda r: 1.0 + r.strain)), "yes"),
-    (currents.load_grows, changed(loads(lambda r: 1.0 + r.strain * (r.path == "shear"))), "partly"),
+    (currents.load_grows, changed(loads(lambda r: 1.0 + r.strain * (r.loading == "shear"))), "partly"),
     (currents.load_grows, changed(loads(lambda r: 1.0 - r.strain)), "no"),
     (currents.reversals, changed(probes(wavy)), "yes"),
-    (currents.reversals, changed(lambda r: r if r.path == "shear" else probes(wavy)(r)), "partly"),
+    (currents.reversals, changed(lambda r: r if r.loading == "shear" else probes(wavy)(r)), "partly"),
     (currents.reversals, changed(probes(lambda r: [0.9, 0.01 + 0.01 * r.strain, 0.01])), "no"),
     (network.insulated_segment, STUDY, "yes"),
     (network.insulated_segment, other_yarn(8.0), "partly"),
@@ -307,7 +307,7 @@ STRAINS = tuple(0.025 * step for step in range(1, 11))
 def test_loadings_are_known_by_their_gradients(loading: Loading, is_stretch: bool, is_shear: bool) -> None:
     states = zip(loading.gradients, loading.strains, strict=True)
     records = [
-        replace(STUDY.records[1], name=f"s{k}", path=loading.name, strain=e, gradient=np.array(F))
+        replace(STUDY.records[1], name=f"s{k}", loading=loading.name, strain=e, gradient=np.array(F))
         for k, (F, e) in enumerate(states)
     ]
     study = replace(STUDY, design=replace(STUDY.design, loading=(loading,)), records=(STUDY.records[0], *records))

@@ -44,11 +44,11 @@ class Fabric:
 
     def along(self, strains: Sequence[float] | Floats, start: Equilibrium) -> list[Equilibrium]:
         """The equilibria along x-strains, from `start` at the first of them."""
-        path = [start]
+        states = [start]
         for before, after in pairwise(strains):
-            moved = move(path[-1].configuration, np.diag([1 + before, 1.0]), np.diag([1 + after, 1.0]))
-            path.append(relax(self.mesh, self.design, moved))
-        return path
+            moved = move(states[-1].configuration, np.diag([1 + before, 1.0]), np.diag([1 + after, 1.0]))
+            states.append(relax(self.mesh, self.design, moved))
+        return states
 
     def touching(self, state: Equilibrium) -> set[tuple[int, int]]:
         """The pairs of fibrils that touch."""
@@ -133,10 +133,10 @@ def test_work_is_stored_where_the_path_is_reversible() -> None:
     the smaller of which h^2 leaves 1e-4.
     """
     fabric, _ = crossing()
-    paths = [clamp_balance(fabric.mesh, reversible(steps)) for steps in (2, 4, 8)]
-    stored = paths[0].stored.sum()
-    assert [path.stored.sum() for path in paths] == pytest.approx([stored] * 3, rel=1e-9)
-    lost = np.array([path.loss.sum() for path in paths])
+    balances = [clamp_balance(fabric.mesh, reversible(steps)) for steps in (2, 4, 8)]
+    stored = balances[0].stored.sum()
+    assert [each.stored.sum() for each in balances] == pytest.approx([stored] * 3, rel=1e-9)
+    lost = np.array([each.loss.sum() for each in balances])
     assert np.log2(lost[:-1] / lost[1:]) == pytest.approx([2.0, 2.0], abs=0.15)
     assert abs(lost[-1]) < 1e-4 * stored
     extrapolated = lost[-1] + (lost[-1] - lost[-2]) / 3
@@ -197,8 +197,8 @@ def loop() -> Loop:
 
 def test_the_cycle_closes_and_all_its_work_is_lost(loop: Loop) -> None:
     """Back at the first state, the energy is what it was: the work of the cycle, which is positive, has gone."""
-    for path, found in zip((loop.coarse, loop.fine), loop.balances(), strict=True):
-        assert apart(path[0], path[-1]) < SAME
+    for states, found in zip((loop.coarse, loop.fine), loop.balances(), strict=True):
+        assert apart(states[0], states[-1]) < SAME
         assert abs(found.stored.sum()) < 1e-8 * np.abs(found.stored).sum()
         assert found.work.sum() > 1e-3 * np.abs(found.work).sum()
 
@@ -290,7 +290,7 @@ def sprung(record: Record, pull: float, lost: float = 0.0) -> Record:
 
 def springs() -> Study:
     """Springs pulled by 0.1 mm, then on two paths to 0.2 and 0.4, and to 0.3 and 0.1, where 0.05 N mm are lost."""
-    study = synthetic_study(3, contacts=4, rows=(1,), paths=("stretch", "shear"))
+    study = synthetic_study(3, contacts=4, rows=(1,), loadings=("stretch", "shear"))
     pulls, lost = (0.1, 0.2, 0.4, 0.3, 0.1), (0.0, 0.0, 0.0, 0.0, 0.05)
     return replace(study, records=tuple(map(sprung, study.records, pulls, lost)))
 
@@ -339,15 +339,15 @@ def test_a_study_keeps_the_balance_of_its_equilibria(tmp_path: Path) -> None:
     study = run_study(design, workers=1, solver=MultifrontalSolver)
     expected: dict[str, EnergyBalance] = {}
     rest = relax(mesh, design, solver=MultifrontalSolver())
-    for path in design.loading:
+    for loading in design.loading:
         states = [rest]
-        gradients = [np.eye(2), *map(np.array, path.gradients)]
+        gradients = [np.eye(2), *map(np.array, loading.gradients)]
         for one, other in pairwise(gradients):
             start = states[-1].configuration
-            found = advance(mesh, design, start, one, other, free=path.free, solver=MultifrontalSolver())
+            found = advance(mesh, design, start, one, other, free=loading.free, solver=MultifrontalSolver())
             states.append(found.equilibrium)
         whole = clamp_balance(mesh, states)
-        names = [record.name for record in study.records if record.path == path.name]
+        names = [record.name for record in study.records if record.loading == loading.name]
         assert len(names) == len(whole.work)
         expected |= {n: EnergyBalance(whole.work[k : k + 1], whole.stored[k : k + 1]) for k, n in enumerate(names)}
     write_study_start(tmp_path / "results.h5", study)

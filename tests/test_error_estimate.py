@@ -28,7 +28,7 @@ from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation.relax import Equilibrium, clamp_force, relax
 from circuittex.relaxation.transfer import transfer
 from circuittex.results.discretisation import ErrorEstimate
-from circuittex.results.records import Record, Study, with_finding
+from circuittex.results.records import Record, Study, with_examination
 from circuittex.results.store import load_study
 from circuittex.study.error_estimate import estimate_error, estimates, variants
 from circuittex.study.run import run_study
@@ -36,12 +36,12 @@ from circuittex.study.run import run_study
 Cell = tuple[Design, FibrilMesh, Record]
 
 
-def record_of(design: Design, mesh: FibrilMesh, state: Equilibrium, path: str = "") -> Record:
+def record_of(design: Design, mesh: FibrilMesh, state: Equilibrium, loading: str = "") -> Record:
     """A record with what an estimate reads of it."""
     fields = solve_probes(contacts_of(design, mesh, state.configuration), design.terminals, design.probes)
     return replace(
         synthetic_study(1, contacts=1, rows=(1,)).records[0],
-        path=path,
+        loading=loading,
         configuration=state.configuration,
         clamp_force=clamp_force(mesh, state.reaction),
         fields=fields,
@@ -121,9 +121,9 @@ def test_a_variant_without_equilibrium_is_named(cell: Cell) -> None:
     assert np.isnan(found.moved).all()
 
 
-@pytest.mark.parametrize(("path", "expected"), [("", ""), ("held", ""), ("strip", "y")])
-def test_the_clamps_are_those_of_the_states_path(
-    path: str, expected: str, cell: Cell, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("loading", "expected"), [("", ""), ("held", ""), ("strip", "y")])
+def test_the_clamps_are_those_of_the_states_loading(
+    loading: str, expected: str, cell: Cell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     design, mesh, record = cell
     design = replace(design, loading=(uniaxial("held", (0.1,)), uniaxial("strip", (0.1,), free="y")))
@@ -134,7 +134,7 @@ def test_the_clamps_are_those_of_the_states_path(
         raise ConvergenceError("not wanted")
 
     monkeypatch.setattr(module, "relax", refuse)
-    estimate_error(design, mesh, replace(record, path=path), MultifrontalSolver)
+    estimate_error(design, mesh, replace(record, loading=loading), MultifrontalSolver)
     assert seen == [expected] * 3
 
 
@@ -184,7 +184,7 @@ def made_up(
 
 @pytest.fixture
 def canned(monkeypatch: pytest.MonkeyPatch) -> Study:
-    """A study of two paths whose states and estimates take no time."""
+    """A study of two loadings whose states and estimates take no time."""
     study = canned_study(3)
     Canned(study).install(monkeypatch)
     monkeypatch.setattr(module, "estimate_error", made_up)
@@ -198,7 +198,7 @@ def run(study: Study, folder: Path, progress: Callable[[str], None] | None = Non
     return run_study(study.design, folder, error_estimate=True, workers=1, progress=progress)
 
 
-def test_a_run_estimates_the_relaxed_state_and_the_last_of_each_path(canned: Study, tmp_path: Path) -> None:
+def test_a_run_estimates_the_relaxed_state_and_the_last_of_each_loading(canned: Study, tmp_path: Path) -> None:
     study = run(canned, tmp_path)
     assert [estimate.state for estimate in study.errors] == ESTIMATED
     assert same(load_study(tmp_path / "results.h5"), study)
@@ -284,7 +284,7 @@ def test_estimates_are_in_the_order_of_their_states(canned: Study) -> None:
     kept, study = [], canned
     for estimate in completed(LastFirst(), estimates(canned, MultifrontalSolver)):
         kept.append(estimate.state)
-        study = with_finding(study, estimate)
+        study = with_examination(study, estimate)
     assert kept == ["stretch-0.05", "shear-0.05", "relaxed"]
     assert [estimate.state for estimate in study.errors] == ESTIMATED
 
@@ -310,5 +310,5 @@ def test_a_computed_study_with_its_estimates() -> None:
         assert 0.0 < along.relative < 1.0
         assert np.isnan([quantity.absolute for quantity in network]).all()  # no probes: Ry and Rc are not known
         # Warp and weft are alike at rest; a free edge carries nothing, whatever the mesh.
-        bound = 1e-5 if record.path else np.inf  # N: ten times the tolerance
+        bound = 1e-5 if record.loading else np.inf  # N: ten times the tolerance
         assert max(abs(across.value), abs(across.fine), abs(across.coarse)) < bound

@@ -103,7 +103,7 @@ def lacking(folder: Path) -> tuple[str, ...]:
     with h5py.File(folder / "results.h5", "r+") as file:
         for record in file["states"].values():
             del record.attrs["energy"], record["end_force"]
-    return str(folder / "results.h5"), "the fields of Record are not those of this version of circuittex"
+    return str(folder / "results.h5"), "the fields of Record are not those of circuittex"
 
 
 def damaged(folder: Path) -> tuple[str, ...]:

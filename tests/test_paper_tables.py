@@ -14,7 +14,7 @@ from circuittex.design import plain_weave
 from circuittex.results.claims import CLAIMS
 
 ROOT = Path(__file__).parents[1]
-STUDY = synthetic_study(3, contacts=40, paths=("stretch", "shear"))
+STUDY = synthetic_study(3, contacts=40, loadings=("stretch", "shear"))
 TABLE = replace(STUDY, design=replace(STUDY.design, weave=plain_weave("paper-table").weave))
 
 

@@ -22,10 +22,10 @@ from circuittex.study.plan import plan, state_names
 )
 def test_every_state_has_a_name_of_its_own(loading: tuple[Loading, ...]) -> None:
     names = state_names(loading)
-    assert [len(path) for path in names] == [len(path.strains) for path in loading]
-    flat = [name for path in names for name in path]
+    assert [len(group) for group in names] == [len(each.strains) for each in loading]
+    flat = [name for group in names for name in group]
     assert len({name.lower() for name in flat}) == len(flat)
-    assert all(name.startswith(path.name) for path, group in zip(loading, names, strict=True) for name in group)
+    assert all(name.startswith(each.name) for each, group in zip(loading, names, strict=True) for name in group)
 
 
 def test_names_stay_plain_where_they_can() -> None:
@@ -39,7 +39,7 @@ def test_names_stay_plain_where_they_can() -> None:
 def test_every_path_starts_from_the_relaxed_state_and_goes_on_from_its_own() -> None:
     strip, turn = uniaxial("strip", (0.1, 0.2), free="y"), shear("turn", (0.3,))
     steps = plan(plain_weave(loading=(strip, turn)))
-    assert [(step.name, step.previous, step.path, step.strain, step.free) for step in steps] == [
+    assert [(step.name, step.previous, step.loading, step.strain, step.free) for step in steps] == [
         ("relaxed", "", "", 0.0, ""),
         ("strip-0.1", "relaxed", "strip", 0.1, "y"),
         ("strip-0.2", "strip-0.1", "strip", 0.2, "y"),

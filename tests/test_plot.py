@@ -24,7 +24,7 @@ from circuittex.base.arrays import Floats
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.results.discretisation import ErrorEstimate, QuantityError
-from circuittex.results.paths import farthest, loading_paths, turns
+from circuittex.results.loadings import by_loading, farthest, turns
 from circuittex.results.plot import (
     FIGURES,
     conductance_figure,
@@ -41,7 +41,7 @@ from circuittex.results.plot.style import COLOURS, save, style
 from circuittex.results.records import Study
 from circuittex.results.store.archive import Digests
 
-STUDY = synthetic_study(2, contacts=40, rows=(3,), paths=("stretch", "shear"))
+STUDY = synthetic_study(2, contacts=40, rows=(3,), loadings=("stretch", "shear"))
 SVG = "{http://www.w3.org/2000/svg}"
 LINK = "{http://www.w3.org/1999/xlink}href"
 
@@ -159,33 +159,33 @@ def test_section_shows_as_many_circles_as_fibrils() -> None:
     ]
 
 
-def test_every_path_starts_at_the_relaxed_state() -> None:
-    paths = loading_paths(STUDY)
-    assert list(paths) == ["stretch", "shear"]
-    assert [record.name for record in paths["shear"]] == ["relaxed", "shear-0.0250"]
-    assert list(loading_paths(replace(STUDY, records=STUDY.records[:1]))) == [""]
+def test_every_loading_starts_at_the_relaxed_state() -> None:
+    loadings = by_loading(STUDY)
+    assert list(loadings) == ["stretch", "shear"]
+    assert [record.name for record in loadings["shear"]] == ["relaxed", "shear-0.0250"]
+    assert list(by_loading(replace(STUDY, records=STUDY.records[:1]))) == [""]
 
 
 def with_strains(strains: tuple[float, ...]) -> Study:
-    """One path with these strains after the relaxed state, forces as large as the strain."""
+    """One loading with these strains after the relaxed state, forces as large as the strain."""
     rest, some = STUDY.records[:2]
-    states = [replace(some, name=f"cycle-{i}", path="cycle", strain=e) for i, e in enumerate(strains)]
+    states = [replace(some, name=f"cycle-{i}", loading="cycle", strain=e) for i, e in enumerate(strains)]
     return replace(STUDY, records=(rest, *(replace(r, clamp_force=np.full((2, 3), r.strain)) for r in states)))
 
 
-def test_a_path_has_come_farthest_before_it_turns_back() -> None:
-    cycle = loading_paths(with_strains((0.1, 0.2, 0.1, 0.2, 0.0)))["cycle"]
+def test_a_loading_has_come_farthest_before_it_turns_back() -> None:
+    cycle = by_loading(with_strains((0.1, 0.2, 0.1, 0.2, 0.0)))["cycle"]
     assert farthest(cycle).name == "cycle-1"
     assert turns([record.strain for record in cycle]) == [2, 3, 4]
-    compressed = loading_paths(with_strains((0.1, -0.3)))["cycle"]
+    compressed = by_loading(with_strains((0.1, -0.3)))["cycle"]
     assert farthest(compressed).strain == -0.3
 
 
-def test_forces_of_every_path_and_direction_have_a_panel() -> None:
+def test_forces_of_every_loading_and_direction_have_a_panel() -> None:
     panels = force_figure(STUDY).axes
     assert [axes.get_title() for axes in panels] == [
-        f"{path}: {clamps}"
-        for path in ("stretch", "shear")
+        f"{loading}: {clamps}"
+        for loading in ("stretch", "shear")
         for clamps in ("warp clamps, +x ends", "weft clamps, +y ends")
     ]
     drawn = {line.get_label(): line.get_ydata() for line in panels[3].lines}
@@ -194,7 +194,7 @@ def test_forces_of_every_path_and_direction_have_a_panel() -> None:
     assert labels[-1] == f"insulated, {INSULATED:.4g} Ω"
 
 
-def test_one_colour_for_each_probe_and_one_line_for_each_path() -> None:
+def test_one_colour_for_each_probe_and_one_line_for_each_loading() -> None:
     panels = conductance_figure(STUDY).axes
     lines = [[line for line in axes.lines if not str(line.get_label()).startswith("_")] for axes in panels]
     assert [[line.get_label() for line in panel] for panel in lines] == [["stretch", "shear"]] * 3
@@ -319,7 +319,7 @@ def test_legends_name_error_bars_once_and_panels_only_their_curves() -> None:
     assert key.get_text() == "estimated discretisation error"
 
 
-def test_every_probe_of_every_path_has_a_picture_of_one_scale() -> None:
+def test_every_probe_of_every_loading_has_a_picture_of_one_scale() -> None:
     panels = [axes for axes in probe_figure(STUDY, STUDY.records[1:], "current").axes if axes.get_title()]
     assert [axes.get_title().split("\n")[0] for axes in panels] == [
         f"{record.name}, probe {probe.name}" for record in STUDY.records[1:] for probe in STUDY.design.probes

@@ -21,12 +21,12 @@ from circuittex.results.outcome import Outcome
 from circuittex.results.plot import FIGURES
 from circuittex.results.plot.curves import conductance_figure, force_figure, network_figure
 from circuittex.results.plot.style import COLOURS
-from circuittex.results.records import Record, Study, with_finding
+from circuittex.results.records import Record, Study, with_examination
 from circuittex.results.report.page import page
-from circuittex.results.store import append_finding, load_study, write_study_start
+from circuittex.results.store import append_examination, load_study, write_study_start
 from circuittex.results.summary import summary, table, write_summary
 
-STUDY = synthetic_study(3, contacts=5, rows=(1,), paths=("stretch", "shear"))
+STUDY = synthetic_study(3, contacts=5, rows=(1,), loadings=("stretch", "shear"))
 REST, FIRST, FORK, LOST, LAST = STUDY.records
 NOTHING = Outcome(np.full((2, 3), nan), (nan,) * 3, nan, nan, nan)
 
@@ -49,7 +49,7 @@ def test_checks_come_back_bit_for_bit_in_the_order_of_their_states(tmp_path: Pat
     path = tmp_path / "results.h5"
     write_study_start(path, STUDY)
     for check in (LOOSE, NONE, KEPT, OTHER):
-        append_finding(path, check)
+        append_examination(path, check)
     with h5py.File(path, "r") as file:
         assert set(file["branches"]) == {check.state for check in CHECKED.branches}
     assert same(load_study(path), CHECKED)
@@ -70,7 +70,7 @@ def test_a_check_is_found_by_its_state() -> None:
     assert CHECKED.check_of(LOST.name) is NONE
     assert CHECKED.check_of(FIRST.name) is None
     assert [CHECKED.bifurcation_of(record.name) for record in STUDY.records] == [None, None, OTHER, None, None]
-    assert same(with_finding(with_finding(STUDY, LOOSE), KEPT), GOOD)
+    assert same(with_examination(with_examination(STUDY, LOOSE), KEPT), GOOD)
 
 
 # ---- Summary and closing table ----------------------------------------------------------------------------

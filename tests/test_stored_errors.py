@@ -18,7 +18,7 @@ from circuittex.results.discretisation import ErrorEstimate, QuantityError
 from circuittex.results.records import Study
 from circuittex.results.report.errors import error_section
 from circuittex.results.report.page import page
-from circuittex.results.store import append_finding, load_study, write_study_start
+from circuittex.results.store import append_examination, load_study, write_study_start
 from circuittex.results.summary import summary, table, write_summary
 
 NAMES = ("Fx warp N", "Fy weft N", "I straight A", "I parallel A", "I perpendicular A", "Ry ohm", "Rc ohm")
@@ -40,8 +40,8 @@ def test_estimates_come_back_bit_for_bit_in_the_order_of_their_states(tmp_path: 
     path = tmp_path / "results.h5"
     write_study_start(path, STUDY)
     assert load_study(path).errors == ()
-    append_finding(path, LAST)
-    append_finding(path, FIRST)
+    append_examination(path, LAST)
+    append_examination(path, FIRST)
     assert same(load_study(path), ESTIMATED)
     write_study_start(path, ESTIMATED)
     assert same(load_study(path), ESTIMATED)

@@ -144,7 +144,7 @@ def test_collection_has_strain_as_time(tmp_path: Path) -> None:
 
 
 def test_every_loading_path_has_a_collection_that_starts_relaxed(tmp_path: Path) -> None:
-    study = synthetic_study(2, contacts=4, rows=(1,), paths=("stretch", "shear"))
+    study = synthetic_study(2, contacts=4, rows=(1,), loadings=("stretch", "shear"))
     files = write_collections(tmp_path, study.records)
     assert [file.name for file in files] == ["stretch.pvd", "shear.pvd"]
     listed = [[s.attrib["file"] for s in ElementTree.parse(file).getroot().iter("DataSet")] for file in files]

@@ -272,7 +272,7 @@ def _load(path: Path) -> Study:
     """The study in a results folder, or in an HDF5 file given by its own name."""
     from circuittex.results.store import load_study
 
-    return load_study(_results_file(path))
+    return load_study(path)
 
 
 def _results_file(path: Path) -> Path:

@@ -27,6 +27,7 @@ class Loading:
     """
 
     name: str
+    """What it is called."""
     gradients: tuple[Gradient, ...]
     """((Fxx, Fxy), (Fyx, Fyy)) of each state."""
     strains: tuple[float, ...]
@@ -144,6 +145,7 @@ class Terminal:
     """
 
     name: str
+    """What it is called."""
     ends: tuple[tuple[str, int], ...]
     """(yarn name, side): -1 for the end at xi3 = 0, +1 for the end at xi3 = L."""
 
@@ -171,12 +173,13 @@ class Probe:
     """
 
     name: str
+    """What it is called."""
     source: str
     """Terminal name."""
     sink: str
     """Terminal name."""
     voltage: float
-    """V."""
+    """Of the source above the sink, V."""
 
     def __post_init__(self) -> None:
         at = f"probes.{name(self.name, 'probes.name')}"

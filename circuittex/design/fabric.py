@@ -27,6 +27,7 @@ class Material:
     """
 
     name: str
+    """What it is called."""
     youngs_modulus: float = field(
         metadata=number(
             "MPa",
@@ -68,6 +69,7 @@ class Yarn:
     """
 
     name: str
+    """What it is called."""
     rows: tuple[int, ...]
     """Fibrils in each row."""
     radius: float = field(metadata=number("mm", "of every fibril", shown="0.15 mm", above=0, at_most=THICKEST))

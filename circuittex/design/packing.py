@@ -39,7 +39,7 @@ class Packing:
     twist: float = field(
         default=0.0, metadata=number("1/mm", "turns per length of each yarn about its axis", shown="0 1/m", at_least=0)
     )
-    """Of the twist of each yarn about its axis, turns per mm; constant along the yarn and none at its middle."""
+    """Of the twist of each yarn about its axis, turns in 1/mm; constant along the yarn and none at its middle."""
     phase: float = field(
         default=0.0, metadata=number("mm", "shift of each yarn's wave along the yarn", shown="0 mm", at_least=0)
     )

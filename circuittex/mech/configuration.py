@@ -14,7 +14,7 @@ class Configuration:
     """Nodal values of r, g1 and g2 [9] for every node of a `FibrilMesh`."""
 
     x: Floats
-    """(N, 3, 3): node, (r in mm, g1, g2), (x, y, z)."""
+    """(N, 3, 3): node, (r, g1, g2) [mm, 1, 1], (x, y, z)."""
 
     @property
     def r(self) -> Floats:

@@ -29,13 +29,13 @@ class QuantityError:
     unit: str
     """'N', 'A' or 'ohm'."""
     value: float
-    """With the design's own numerics."""
+    """With the design's own numerics, in `unit`."""
     coarse: float
-    """On half as many elements; nan where there is no equilibrium."""
+    """On half as many elements, in `unit`; nan where there is no equilibrium."""
     fine: float
-    """On twice as many elements; nan likewise."""
+    """On twice as many elements, in `unit`; nan likewise."""
     more_points: float
-    """With twice as many contact points an element; nan likewise."""
+    """With twice as many contact points an element, in `unit`; nan likewise."""
 
     @property
     def order(self) -> float:

@@ -28,8 +28,8 @@ class Record:
 
     name: str
     """For example 'relaxed' or 'stretch-0.05'."""
-    path: str
-    """Name of the loading path; empty for the relaxed state."""
+    loading: str
+    """Name of the loading path that led here; empty for the relaxed state."""
     strain: float
     """The strain that labels the state."""
     gradient: Floats
@@ -43,7 +43,7 @@ class Record:
     parts: int
     """Parts into which the increment to this state was halved; 1 where it converged as a whole."""
     history: Floats
-    """(n, 4) per iteration of the last part: residual N, energy N mm, shift (`minimise`), step length."""
+    """(n, 4) per iteration of the last part: residual, energy, shift (`minimise`), step length [N, N mm, 1, 1]."""
     clamp_force: Floats
     """(2, 3) total force of the clamps on the +x ends of the warp and the +y ends of the weft, N [40, 41]."""
     end_force: Floats
@@ -65,12 +65,12 @@ class Record:
     verification: Verification
     """How the routes to the currents and voltages agree."""
     field_convergence: Floats
-    """(3, 2) node distance in mm and largest relative current error of the field on the mechanical mesh and on two
+    """(3, 2) node distance and largest relative current error [mm, 1] of the field on the mechanical mesh and on two
     refinements of it, against the circuit; (0, 2) where it was not studied."""
     levels: int
     """Levels in which the fibrils of the centre warp yarn lie at its centre crossing."""
     netlist: str
-    """Path of the detailed sub-circuit, relative to the results folder (if the study has one)."""
+    """File of the detailed sub-circuit, relative to the results folder (if the study has one)."""
     ports: PortMatrix = PortMatrix()
     """The exact reduction of the circuit with merged contacts to the yarn ends."""
 
@@ -112,7 +112,7 @@ class Study:
     initial: Configuration
     """The configuration before the first relaxation."""
     records: tuple[Record, ...]
-    """The recorded states: the relaxed one, then path by path in the order of the design."""
+    """The recorded states: the relaxed one, then loading by loading in the order of the design."""
     errors: tuple[ErrorEstimate, ...] = ()
     """Estimated discretisation errors, in the order of their states; not every state has one."""
     branches: tuple[BranchCheck, ...] = ()
@@ -132,16 +132,16 @@ class Study:
         return check if check is not None and check.bifurcation else None
 
 
-Finding = ErrorEstimate | BranchCheck
-"""What is found out about a recorded state after it was recorded, and names it."""
-FINDINGS: dict[type[Finding], str] = {ErrorEstimate: "errors", BranchCheck: "branches"}
-"""Kind of finding -> the field of a `Study` that holds them."""
+Examination = ErrorEstimate | BranchCheck
+"""What is found out about a state after it was recorded, and names it."""
+EXAMINATIONS: dict[type[Examination], str] = {ErrorEstimate: "errors", BranchCheck: "branches"}
+"""Kind of examination -> the field of a `Study` that holds them."""
 
 
-def with_finding(study: Study, finding: Finding) -> Study:
-    """The study with one more finding, in the order of its states."""
-    field = FINDINGS[type(finding)]
+def with_examination(study: Study, examination: Examination) -> Study:
+    """The study with one more examination, in the order of its states."""
+    field = EXAMINATIONS[type(examination)]
     place = {record.name: number for number, record in enumerate(study.records)}
-    found: list[Finding] = [*getattr(study, field), finding]
+    found: list[Examination] = [*getattr(study, field), examination]
     changed: dict[str, Any] = {field: tuple(sorted(found, key=lambda each: place[each.state]))}
     return replace(study, **changed)

@@ -124,11 +124,11 @@ def table(study: Study) -> str:
     A blank line parts the loading paths."""
     head = ["state", "Fx warp N", "Fy weft N", *(f"{probe.name} A" for probe in study.design.probes)]
     rows = [[*head, *_resistances(study), "overlap", "iterations", "routes differ"]]
-    path = ""
+    loading = ""
     for record in study.records:
-        if record.path != path:
+        if record.loading != loading:
             rows.append([""] * len(rows[0]))
-            path = record.path
+            loading = record.loading
         network = record.fit.kind_resistance, record.fit.pair_resistance
         numbers = [record.clamp_force[0, 0], record.clamp_force[1, 1], *record.currents, *np.concatenate(network)]
         rows.append([record.name, *(f"{number:#.4g}" if number == number else "-" for number in numbers)])
@@ -282,7 +282,7 @@ def _state(study: Study, record: Record, step: EnergyBalance | None) -> dict[str
     error, check = study.error_of(record.name), study.check_of(record.name)
     return {
         "name": record.name,
-        "path": record.path,
+        "path": record.loading,
         "strain": record.strain,
         "gradient": record.gradient,
         "residual_N": record.residual,

@@ -13,7 +13,7 @@ from circuittex.base.errors import DesignError
 from circuittex.base.frozen import frozen
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
-from circuittex.results.paths import loading_paths
+from circuittex.results.loadings import by_loading
 from circuittex.results.records import Study
 
 
@@ -70,26 +70,26 @@ def balance(position: Floats, force: Floats, energy: Floats) -> EnergyBalance:
     return EnergyBalance(work=np.sum(mean * np.diff(position, axis=0), axis=(1, 2)), stored=np.diff(energy))
 
 
-def clamp_balance(mesh: FibrilMesh, path: Sequence[Held]) -> EnergyBalance:
-    """The energy balance of a fabric along a path of equilibria, in the order in which they were reached.
+def clamp_balance(mesh: FibrilMesh, states: Sequence[Held]) -> EnergyBalance:
+    """The energy balance of a fabric along a series of equilibria, in the order in which they were reached.
 
     The clamps are the two ends of every fibril [49]; ends that are not held carry no force and do no work.
     """
     ends = mesh.ends
     return balance(
-        np.array([state.configuration.r[ends] for state in path]).reshape(-1, len(ends), 3),
-        np.array([state.reaction[ends] for state in path]).reshape(-1, len(ends), 3),
-        np.array([state.energy for state in path]),
+        np.array([state.configuration.r[ends] for state in states]).reshape(-1, len(ends), 3),
+        np.array([state.reaction[ends] for state in states]).reshape(-1, len(ends), 3),
+        np.array([state.energy for state in states]),
     )
 
 
 def step_balances(study: Study) -> dict[str, EnergyBalance]:
     """State -> the balance of the one step that led to it, from the recorded state before it on its loading path.
 
-    The first step of a path starts at the relaxed state, which no step leads to.
+    The first step of a loading starts at the relaxed state, which no step leads to.
     """
     return {
         after.name: clamp_balance(study.mesh, (before, after))
-        for records in loading_paths(study).values()
+        for records in by_loading(study).values()
         for before, after in pairwise(records)
     }

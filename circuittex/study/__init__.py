@@ -1,1 +1,1 @@
-"""From a design to a finished folder: the states of its paths, checked, recorded and written."""
+"""From a design to a finished folder: the states of its loadings, checked, recorded and written."""

@@ -87,7 +87,7 @@ def estimate_error(
 
     Raises `DesignError` as `variants` does.
     """
-    free = next((loading.free for loading in design.loading if loading.name == record.path), "")
+    free = next((loading.free for loading in design.loading if loading.name == record.loading), "")
     repeats = []
     for words, other in zip(VARIANTS, variants(design), strict=True):
         if say is not None:
@@ -107,8 +107,8 @@ def estimate_error(
 
 
 def without_estimate(study: Study) -> tuple[Record, ...]:
-    """The states that an error estimate is for and that have none yet: the relaxed one and the last of each path."""
-    last = {record.path: record for record in study.records}  # one each: the relaxed state's path is empty
+    """The states that an error estimate is for and that have none yet: the relaxed one and the last of each loading."""
+    last = {record.loading: record for record in study.records}  # one each: the relaxed state's loading is empty
     known = {estimate.state for estimate in study.errors}
     return tuple(record for record in last.values() if record.name not in known)
 

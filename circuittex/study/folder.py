@@ -8,15 +8,20 @@ from pathlib import Path
 from circuittex.base.atomic import PARTIAL
 from circuittex.base.errors import FolderError, StoreError
 from circuittex.results.plot import FIGURES
-from circuittex.results.records import Finding, Record, Study, with_finding
+from circuittex.results.records import Examination, Record, Study, with_examination
 from circuittex.results.report import write_report
-from circuittex.results.store import append_finding, append_record, load_study, write_study_start
+from circuittex.results.store import (
+    RESULTS,
+    append_examination,
+    append_record,
+    complete_change,
+    load_study,
+    write_study_start,
+)
 from circuittex.results.summary import write_summary
 from circuittex.results.vtk.vtu import write_collections, write_vtu
 from circuittex.study.export import netlist_files, simplified, write_netlists
 
-RESULTS = "results.h5"
-"""Name of the HDF5 file in the folder."""
 MARKS = {
     "netlists/*.sub": b"* circuittex ",
     "netlists/*.cir": b"* circuittex ",
@@ -46,6 +51,7 @@ def open_study(folder: Path, study: Study, *, fresh: bool = False) -> Study:
             )
         write_study_start(path, study)
     else:
+        complete_change(path)
         return _continued(path, study)
     return study
 
@@ -82,11 +88,11 @@ def keep_record(folder: Path, study: Study, record: Record) -> Study:
     return replace(study, records=(*study.records, record))
 
 
-def keep_finding(folder: Path, study: Study, finding: Finding) -> Study:
-    """The study with one more finding about a state, which is in the HDF5 file then; an older report goes."""
+def keep_examination(folder: Path, study: Study, examination: Examination) -> Study:
+    """The study with one more examination about a state, which is in the HDF5 file then; an older report goes."""
     (folder / REPORT).unlink(missing_ok=True)
-    append_finding(folder / RESULTS, finding)
-    return with_finding(study, finding)
+    append_examination(folder / RESULTS, examination)
+    return with_examination(study, examination)
 
 
 def write_state(folder: Path, study: Study, record: Record) -> None:

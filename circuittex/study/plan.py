@@ -24,7 +24,7 @@ class Step:
     """Its name; unique in the study."""
     previous: str
     """Name of the state that it starts from; empty for the relaxed state."""
-    path: str
+    loading: str
     """Name of the loading path; empty for the relaxed state."""
     strain: float
     """The strain that labels it."""
@@ -37,7 +37,7 @@ class Step:
 
 
 def plan(design: Design) -> tuple[Step, ...]:
-    """All states of a design in their canonical order: the relaxed one, then path by path as the design has them.
+    """All states of a design in their canonical order: the relaxed one, then loading by loading as the design has them.
 
     >>> from circuittex.design import plain_weave, shear
     >>> [(step.previous, step.name) for step in plan(plain_weave(loading=(shear("shear", (0.05, 0.1)),)))]
@@ -55,7 +55,7 @@ def plan(design: Design) -> tuple[Step, ...]:
 
 
 def state_names(loading: Sequence[Loading]) -> tuple[tuple[str, ...], ...]:
-    """A name for each state of each loading path: the path's name and the strain, numbered where one recurs.
+    """A name for each state of each loading path: its name and the strain, numbered where one recurs.
 
     Names are unique over the whole study, in files and as words of a netlist, which know neither case nor signs.
 
@@ -71,4 +71,4 @@ def state_names(loading: Sequence[Loading]) -> tuple[tuple[str, ...], ...]:
         taken.add(state_word(free))
         return free
 
-    return tuple(tuple(unique(f"{path.name}-{strain:.6g}") for strain in path.strains) for path in loading)
+    return tuple(tuple(unique(f"{each.name}-{strain:.6g}") for strain in each.strains) for each in loading)

@@ -96,11 +96,11 @@ def record_state(study: Study, step: Step, reached: Increment, say: Callable[[st
     ports = port_matrix(build_circuit(merged, conducting_ends(mesh)))
     fit = fit_network(_told(fields, circuits, design), design, ports)
     convergence = np.empty((0, 2))
-    if not step.path:
+    if not step.loading:
         convergence = field_convergence(contacts, design.terminals, design.probes, fields)
     return Record(
         name=step.name,
-        path=step.path,
+        loading=step.loading,
         strain=step.strain,
         gradient=step.after,
         configuration=equilibrium.configuration,

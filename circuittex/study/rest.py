@@ -49,14 +49,14 @@ class Rest:
         """States that are finished."""
         return self.total - self.left.total()
 
-    def done(self, path: str) -> None:
-        """Count one more state, of that path."""
+    def done(self, loading: str) -> None:
+        """Count one more state, of that loading path."""
         now = self.clock()
-        if path:
+        if loading:
             self.spent += (now - self.since) * self._busy()
             self.steps += 1
         self.since = now
-        self.left[path] -= 1
+        self.left[loading] -= 1
 
     def __call__(self, text: str) -> None:
         """Say `text` with what is known of the others; a line that stays on the screen is said as it is."""

@@ -19,12 +19,12 @@ from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.mech.multifrontal import MultifrontalSolver
-from circuittex.results.records import Finding, Record, Study, with_finding
+from circuittex.results.records import Examination, Record, Study, with_examination
 from circuittex.study.branch_check import branch_checks
 from circuittex.study.error_estimate import estimates, variants
 from circuittex.study.folder import (
     complete,
-    keep_finding,
+    keep_examination,
     keep_record,
     needs_report,
     open_study,
@@ -91,7 +91,7 @@ def run_study(
 
     if out is None:
         study = _compute(study, count, solver, say, _with)
-        return _examine(study, jobs(study), count, say, with_finding)
+        return _examine(study, jobs(study), count, say, with_examination)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     with locked(folder):
@@ -108,21 +108,22 @@ def _in_folder(
     jobs: Callable[[Study], Sequence[Job]],
 ) -> Study:
     """Complete the study and everything in its folder."""
-    path, known = {step.name: step.path for step in plan(study.design)}, {record.name for record in study.records}
+    loading = {step.name: step.loading for step in plan(study.design)}
+    known = {record.name for record in study.records}
     if known:
-        say(f"{len(known)} of {len(path)} states are there already\n")
-    rest = Rest(Counter(path[name] for name in path if name not in known), len(path), workers, say)
+        say(f"{len(known)} of {len(loading)} states are there already\n")
+    rest = Rest(Counter(loading[name] for name in loading if name not in known), len(loading), workers, say)
 
     def keep(so_far: Study, record: Record) -> Study:
         so_far = keep_record(folder, so_far, record)
-        rest.done(path[record.name])
+        rest.done(loading[record.name])
         write_state(folder, so_far, record)
         write_numbers(folder, so_far)
         return so_far
 
     try:
         study = _compute(study, workers, solver, rest, keep)
-        study = _examine(study, jobs(study), workers, say, partial(keep_finding, folder))
+        study = _examine(study, jobs(study), workers, say, partial(keep_examination, folder))
         if needs_report(folder):
             say("figures and report")
         complete(folder, study)
@@ -136,8 +137,8 @@ def _in_folder(
 def _compute(study: Study, workers: int, solver: Callable[[], LinearSolver], say: Say, keep: Keep) -> Study:
     """The study with all its states."""
     known = {record.name for record in study.records}
-    paths = {step.path for step in plan(study.design) if step.path and step.name not in known}
-    workers = min(workers, len(paths))  # more would wait for one another
+    loadings = {step.loading for step in plan(study.design) if step.loading and step.name not in known}
+    workers = min(workers, len(loadings))  # more would wait for one another
     if workers <= 1:
         return compute(study, Here(say), solver, keep)
     pool = Pool(workers, threads=max(1, available_cores() // workers), say=say)
@@ -151,14 +152,14 @@ def _compute(study: Study, workers: int, solver: Callable[[], LinearSolver], say
 
 
 def _examine(
-    study: Study, jobs: Sequence[Job], workers: int, say: Say, keep: Callable[[Study, Finding], Study]
+    study: Study, jobs: Sequence[Job], workers: int, say: Say, keep: Callable[[Study, Examination], Study]
 ) -> Study:
     """The study with what the jobs find about its states."""
     workers = min(workers, len(jobs))
     pool = Pool(workers, threads=max(1, available_cores() // workers), say=say) if workers > 1 else Here(say)
     with closing(pool) as computers:
-        for finding in completed(computers, jobs):
-            study = keep(study, finding)
+        for examination in completed(computers, jobs):
+            study = keep(study, examination)
     return study
 
 

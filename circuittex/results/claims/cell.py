@@ -9,7 +9,7 @@ import numpy as np
 from circuittex.base.arrays import Floats
 from circuittex.base.frozen import frozen, same
 from circuittex.design import Design, Probe, Weave, Yarn, plain_weave
-from circuittex.results.paths import loading_paths
+from circuittex.results.loadings import by_loading
 from circuittex.results.records import Record, Study
 
 SETS = ("paper-code", "paper-table")
@@ -75,21 +75,21 @@ def paper_study(study: Study) -> PaperStudy | None:
     return PaperStudy(
         study=study,
         probes=probes if len(probes) == len(wanted) else (),
-        stretch=_path(study, np.array([[1.0, 0.0], [0.0, 0.0]])),
-        shear=_path(study, np.array([[0.0, 0.0], [1.0, 0.0]])),
+        stretch=_along(study, np.array([[1.0, 0.0], [0.0, 0.0]])),
+        shear=_along(study, np.array([[0.0, 0.0], [1.0, 0.0]])),
     )
 
 
-def _path(study: Study, direction: Floats) -> tuple[Record, ...]:
-    """The records of the path F = I + e `direction` with growing e that goes farthest; clamps on all sides."""
+def _along(study: Study, direction: Floats) -> tuple[Record, ...]:
+    """The records of the loading F = I + e `direction` with growing e that goes farthest; clamps on all sides."""
     found: tuple[Record, ...] = ()
     free = {loading.name for loading in study.design.loading if loading.free}
-    for name, records in loading_paths(study).items():
+    for name, records in by_loading(study).items():
         offsets = np.array([record.gradient - np.eye(2) for record in records])
         size = (offsets * direction).sum(axis=(1, 2))
         along = np.allclose(offsets, size[:, None, None] * direction, rtol=0.0, atol=1e-12)
         if along and name not in free and len(records) > 1 and (np.diff(size) > 0.0).all() and size[0] == 0.0:
-            found = max(found, records, key=lambda path: path[-1].strain if path else 0.0)
+            found = max(found, records, key=lambda states: states[-1].strain if states else 0.0)
     return found
 
 

@@ -165,7 +165,7 @@ def contact_force(contacts: ContactState) -> float:
 
 
 def trend(records: tuple[Record, ...], values: Floats) -> Floats:
-    """(k,) relative change of values (n, k) over the path along the straight line that fits them best."""
+    """(k,) relative change of values (n, k) over the loading along the straight line that fits them best."""
     strain = np.array([record.strain for record in records])
     slope: Floats = np.polyfit(strain, values, 1)[0] * np.ptp(strain) / values[0]
     return slope

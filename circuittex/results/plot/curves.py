@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats
+from circuittex.results.loadings import by_loading, turns
 from circuittex.results.outcome import Outcome
-from circuittex.results.paths import loading_paths, turns
 from circuittex.results.plot.error_bars import Bar, draw_error_bars, error_bar_key
 from circuittex.results.plot.style import COLOURS, GREY, LINES, MARKERS, new_figure, style
 from circuittex.results.records import Record, Study
@@ -31,36 +31,36 @@ Value = Callable[[Outcome], float]
 
 def force_figure(study: Study) -> Figure:
     """Total clamp force in all components, N [40, 41]: for each loading path the warp's above the weft's."""
-    paths = loading_paths(study)
-    columns = min(len(paths), MOST_COLUMNS)
-    rows = 2 * -(-len(paths) // columns)
+    loadings = by_loading(study)
+    columns = min(len(loadings), MOST_COLUMNS)
+    rows = 2 * -(-len(loadings) // columns)
     with style():
         figure = new_figure(max(4.0 * columns, 4.6), 2.7 * rows)
-        for number, (path, records) in enumerate(paths.items()):
+        for number, (loading, records) in enumerate(loadings.items()):
             block, column = divmod(number, columns)
             for side, clamps in enumerate(CLAMPS):
                 axes = figure.add_subplot(rows, columns, (2 * block + side) * columns + column + 1)
                 for component, name in enumerate(("Fx", "Fy", "Fz")):
                     _line(axes, study, records, _clamp_force(side, component), COLOURS[component], component, name)
                 draw_error_bars(axes, _bars(study, [records], ESTIMATED[side]), COLOURS[side])
-                axes.set_title(f"{path}: {clamps}" if path else clamps)
+                axes.set_title(f"{loading}: {clamps}" if loading else clamps)
                 axes.set_ylabel("force (N)")
-        _finish(figure, study, [path for path in paths for _ in CLAMPS])
+        _finish(figure, study, [loading for loading in loadings for _ in CLAMPS])
     return figure
 
 
 def conductance_figure(study: Study) -> Figure:
     """Current of each probe against strain, A, one panel for each probe: their sizes differ by orders."""
-    probes, paths = study.design.probes, loading_paths(study)
+    probes, loadings = study.design.probes, by_loading(study)
     columns = min(len(probes), MOST_COLUMNS)
     rows = -(-len(probes) // columns)
     with style():
         figure = new_figure(max(3.1 * columns, 3.6), 3.2 * rows)
         for number, probe in enumerate(probes):
             axes = figure.add_subplot(rows, columns, number + 1)
-            for k, (path, records) in enumerate(paths.items()):
-                _line(axes, study, records, _current(number), COLOURS[number % len(COLOURS)], k, path)
-            draw_error_bars(axes, _bars(study, paths.values(), f"I {probe.name}"), COLOURS[number % len(COLOURS)])
+            for k, (loading, records) in enumerate(loadings.items()):
+                _line(axes, study, records, _current(number), COLOURS[number % len(COLOURS)], k, loading)
+            draw_error_bars(axes, _bars(study, loadings.values(), f"I {probe.name}"), COLOURS[number % len(COLOURS)])
             axes.set_title(f"probe {probe.name}")
             axes.set_ylabel(f"current at {probe.voltage:g} V (A)")
         _finish(figure, study, [])
@@ -69,20 +69,20 @@ def conductance_figure(study: Study) -> Figure:
 
 def network_figure(study: Study) -> Figure:
     """Ry and Rc of the reduced network [43-47] against strain, ohm; dashed the Ry of insulated yarns [57]."""
-    paths = loading_paths(study)
+    loadings = by_loading(study)
     with style():
         figure = new_figure(8.0, 3.4)
         left, right = figure.subplots(1, 2)
-        for k, (path, records) in enumerate(paths.items()):
-            _line(left, study, records, lambda outcome: outcome.Ry, COLOURS[0], k, path)
-            _line(right, study, records, lambda outcome: outcome.Rc, COLOURS[1], k, path)
+        for k, (loading, records) in enumerate(loadings.items()):
+            _line(left, study, records, lambda outcome: outcome.Ry, COLOURS[0], k, loading)
+            _line(right, study, records, lambda outcome: outcome.Rc, COLOURS[1], k, loading)
         insulated = insulated_resistance(study.mesh)
         if np.isfinite(insulated):
             left.axhline(insulated, color=GREY, linestyle="--", linewidth=1.0, label=f"insulated, {insulated:.4g} Ω")
             low, high = left.get_ylim()  # at least 1 % either side, lest differences in the fifth digit fill the axis
             left.set_ylim(min(low, 0.99 * insulated), max(high, 1.01 * insulated))
-        draw_error_bars(left, _bars(study, paths.values(), "Ry"), COLOURS[0])
-        draw_error_bars(right, _bars(study, paths.values(), "Rc"), COLOURS[1])
+        draw_error_bars(left, _bars(study, loadings.values(), "Ry"), COLOURS[0])
+        draw_error_bars(right, _bars(study, loadings.values(), "Rc"), COLOURS[1])
         for axes, ohms in ((left, [r.fit.Ry for r in study.records]), (right, [r.fit.Rc for r in study.records])):
             if not np.isfinite(ohms).any():
                 axes.text(0.5, 0.5, "infinite or not determined", ha="center", va="center", transform=axes.transAxes)
@@ -102,9 +102,9 @@ def _current(number: int) -> Value:
     return lambda outcome: outcome.currents[number]
 
 
-def _bars(study: Study, paths: Iterable[Sequence[Record]], name: str) -> Iterator[Bar]:
-    """The error bars of these paths for the quantity that error estimates call `name`, in the dashes of their lines."""
-    for kind, records in enumerate(paths):
+def _bars(study: Study, loadings: Iterable[Sequence[Record]], name: str) -> Iterator[Bar]:
+    """The error bars for the quantity that error estimates call `name`, in the dashes of each loading's line."""
+    for kind, records in enumerate(loadings):
         for record in records:
             if (estimate := study.error_of(record.name)) is not None:
                 quantity = estimate.quantity(name)
@@ -114,7 +114,7 @@ def _bars(study: Study, paths: Iterable[Sequence[Record]], name: str) -> Iterato
 def _line(
     axes: Axes, study: Study, records: Sequence[Record], value: Value, colour: str, kind: int, label: str
 ) -> None:
-    """One quantity along one path; `kind` chooses marker and dashes. States on the way back have hollow markers, the
+    """One quantity along one loading; `kind` chooses marker and dashes. States on the way back have hollow markers, the
     other branches of bifurcations diamonds."""
     strain = np.array([record.strain for record in records])
     values = np.array([value(record.outcome) for record in records])
@@ -142,16 +142,16 @@ def _on_the_way_back(strain: Floats) -> NDArray[np.bool_]:
 
 
 def _finish(figure: Figure, study: Study, names: Sequence[str]) -> None:
-    """Labels and legends; `names` are the paths of the panels where each shows but one."""
-    paths = list(loading_paths(study).values())
-    only = names or [records[-1].path if len(paths) == 1 else "" for records in paths[:1] for _ in figure.axes]
+    """Labels and legends; `names` are the loadings of the panels where each shows but one."""
+    loadings = list(by_loading(study).values())
+    only = names or [records[-1].loading if len(loadings) == 1 else "" for records in loadings[:1] for _ in figure.axes]
     for axes, name in zip(figure.axes, only, strict=True):
         axes.set_xlabel(f"strain ({name})" if name else "strain")
         axes.ticklabel_format(axis="y", useOffset=False)
         if axes.get_legend_handles_labels()[1]:
             axes.legend()
     keys = []
-    if any(turns([record.strain for record in records]) for records in paths):
+    if any(turns([record.strain for record in records]) for records in loadings):
         keys += [
             Line2D([], [], marker="o", linestyle="", color=GREY, markerfacecolor=face, markersize=4.5, label=label)
             for face, label in ((GREY, "strain growing"), ("white", "on the way back"))

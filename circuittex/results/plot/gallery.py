@@ -7,7 +7,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from circuittex.results.paths import farthest, loading_paths
+from circuittex.results.loadings import by_loading, farthest
 from circuittex.results.plot.checks import convergence_figure, verification_figure
 from circuittex.results.plot.curves import conductance_figure, force_figure, network_figure
 from circuittex.results.plot.section import section_figure
@@ -40,9 +40,9 @@ def save_figures(study: Study, folder: str | Path) -> dict[str, Path]:
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     unwanted = set() if study.design.probes else NEED_PROBES
-    unwanted |= set() if any(record.path for record in study.records) else NEED_LOADING
+    unwanted |= set() if any(record.loading for record in study.records) else NEED_LOADING
     return {name: save(draw(study), folder, name)[0] for name, draw in FIGURES.items() if name not in unwanted}
 
 
 def _farthest(study: Study) -> tuple[Record, ...]:
-    return tuple(farthest(records) for records in loading_paths(study).values())
+    return tuple(farthest(records) for records in by_loading(study).values())

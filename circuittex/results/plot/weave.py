@@ -15,7 +15,7 @@ from circuittex.base.arrays import Floats
 from circuittex.base.frozen import frozen
 from circuittex.electrical.fields import Fields
 from circuittex.geometry.mesh import FibrilMesh
-from circuittex.results.paths import farthest, loading_paths
+from circuittex.results.loadings import by_loading, farthest
 from circuittex.results.plot.scene import Camera, camera, draw_tubes
 from circuittex.results.plot.style import GREY, bare, new_figure, style
 from circuittex.results.records import Record, Study
@@ -43,7 +43,7 @@ def cell_figure(study: Study, record: Record) -> Figure:
 
 def strained_figure(study: Study) -> Figure:
     """The cell where each loading path has come farthest, coloured by section force, N: figure 12 of the paper."""
-    return _force_figure(study, tuple(farthest(records) for records in loading_paths(study).values()), 900)
+    return _force_figure(study, tuple(farthest(records) for records in by_loading(study).values()), 900)
 
 
 def _force_figure(study: Study, records: Sequence[Record], pixels: int) -> Figure:

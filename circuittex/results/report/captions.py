@@ -43,7 +43,7 @@ _FIGURES_OF_THE_PAPER = {
 
 def captions(study: Study) -> dict[str, str]:
     """Figure -> what it shows; for the paper's cell with the number of the paper's figure of the same."""
-    strained = any(record.path for record in study.records)
+    strained = any(record.loading for record in study.records)
     where = "at the largest strain of each loading path" if strained else "of the relaxed cell"
     texts = {name: text.format(where=where) for name, text in _CAPTIONS.items()}
     if study.errors:

@@ -46,13 +46,15 @@ def _loading(design: Design) -> dict[str, Any]:
     head = ["path", "states", "strain", "last average deformation gradient", "ends let go"]
     rows = [
         [
-            path.name,
-            str(len(path.strains)),
-            f"{min(path.strains):g} to {max(path.strains):g}",
-            ", ".join(f"F{i}{j} {path.gradients[-1][a][b]:g}" for a, i in enumerate("xy") for b, j in enumerate("xy")),
-            f"yarns along {path.free}" if path.free else "none",
+            loading.name,
+            str(len(loading.strains)),
+            f"{min(loading.strains):g} to {max(loading.strains):g}",
+            ", ".join(
+                f"F{i}{j} {loading.gradients[-1][a][b]:g}" for a, i in enumerate("xy") for b, j in enumerate("xy")
+            ),
+            f"yarns along {loading.free}" if loading.free else "none",
         ]
-        for path in design.loading
+        for loading in design.loading
     ]
     return _part("Loading", head, rows)
 

@@ -1,5 +1,12 @@
 """Results in one HDF5 file: written state by state, complete at any moment, reloaded bit for bit."""
 
-from circuittex.results.store.file import append_finding, append_record, load_study, write_study_start
+from circuittex.results.store.file import (
+    RESULTS,
+    append_examination,
+    append_record,
+    complete_change,
+    load_study,
+    write_study_start,
+)
 
-__all__ = ["append_finding", "append_record", "load_study", "write_study_start"]
+__all__ = ["RESULTS", "append_examination", "append_record", "complete_change", "load_study", "write_study_start"]

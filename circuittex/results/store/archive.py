@@ -17,6 +17,7 @@ import h5py
 import numpy as np
 
 from circuittex.base.errors import StoreError
+from circuittex.base.version import __version__
 from circuittex.results.store.meaning import meanings, summary, unit
 
 TYPE = "@type"
@@ -26,6 +27,8 @@ MEANING, UNIT, ATTRIBUTES = "description", "unit", "about"
 RESERVED = {MEANING, ATTRIBUTES}
 """Attributes of groups that are no fields."""
 
+Former = Mapping[str, Mapping[str, str]]
+"""Dataclass -> field -> the name that it has in files of an older layout."""
 _SCALARS = (bool, int, float, str)
 _COMPRESS_ABOVE = 256  # elements; below, chunking costs more than compression saves
 
@@ -53,12 +56,14 @@ def registry(root: type) -> dict[str, type]:
 class Digests:
     """Content digests; remembers the objects it has seen, which must stay alive and unchanged meanwhile.
 
-    `without` names fields of dataclasses that do not count: those that an older file lacks.
+    `without` names fields of dataclasses that do not count: those that an older file lacks. `former` has the names
+    under which an older file counts fields: dataclass -> field -> its name there.
     """
 
-    def __init__(self, without: Mapping[str, Set[str]] | None = None) -> None:
+    def __init__(self, without: Mapping[str, Set[str]] | None = None, former: Former | None = None) -> None:
         self._known: dict[int, tuple[object, str]] = {}
         self._without = without if without is not None else {}
+        self._former = former if former is not None else {}
 
     def __call__(self, value: object) -> str:
         """Digest of arrays, scalars, tuples and dataclasses; equal exactly for equal types and equal bits.
@@ -79,9 +84,10 @@ class Digests:
         elif is_dataclass(value) and not isinstance(value, type):
             result.update(type(value).__name__.encode())
             lacking = self._without.get(type(value).__name__, set())
+            former = self._former.get(type(value).__name__, {})
             for field in fields(value):
                 if field.name not in lacking:
-                    result.update(f"{field.name}={self(getattr(value, field.name))}".encode())
+                    result.update(f"{former.get(field.name, field.name)}={self(getattr(value, field.name))}".encode())
         elif value is None or type(value) in _SCALARS:
             text = value.hex() if isinstance(value, float) else repr(value)
             result.update(f"{type(value).__name__}{text}".encode())
@@ -131,14 +137,14 @@ class Writer:
             stored.attrs[TYPE] = "tuple"
             stored.attrs["@length"] = len(value)
             for number, item in enumerate(value):
-                self.put(stored, f"{number:04d}", item, meaning)
+                self.put(stored, f"{number:04d}", item, _told(item, meaning))
         else:
             stored = self._shared.create_group(key)
             stored.attrs[TYPE] = type(value).__name__
             self.fields(stored, value)
         if meaning:
             stored.attrs[MEANING] = meaning
-            if isinstance(stored, h5py.Dataset):
+            if isinstance(stored, h5py.Dataset) and stored.dtype.kind in "iufc":
                 stored.attrs[UNIT] = unit(meaning)
 
     def fields(self, group: h5py.Group, value: Any) -> None:
@@ -146,21 +152,25 @@ class Writer:
         told = meanings(type(value))
         scalars = []
         for field in fields(value):
-            content, meaning = getattr(value, field.name), told.get(field.name, "")
-            if is_dataclass(content) and not isinstance(content, type):
-                meaning = summary(type(content))  # the same wherever it stands: one object, shared
+            content = getattr(value, field.name)
+            meaning = _told(content, told.get(field.name, ""))
             self.put(group, field.name, content, meaning)
             if meaning and (content is None or type(content) in _SCALARS):
-                scalars.append(f"{field.name} [{unit(meaning)}]: {meaning}")
+                of = f" [{unit(meaning)}]" if type(content) in (int, float) else ""
+                scalars.append(f"{field.name}{of}: {meaning}")
         if scalars:
             group.attrs[ATTRIBUTES] = "\n".join(scalars)
 
 
 class Reader:
-    """Rebuilds objects from an open HDF5 file; what is one object in the file becomes one object in memory."""
+    """Rebuilds objects from an open HDF5 file; what is one object in the file becomes one object in memory.
 
-    def __init__(self, types: Mapping[str, type]) -> None:
-        self._types = types
+    `former` are names of fields in files of an older layout, `author` the version of circuittex that wrote the file.
+    """
+
+    def __init__(self, types: Mapping[str, type], former: Former | None = None, author: str = "unknown") -> None:
+        self._types, self._author = types, author
+        self._former = former if former is not None else {}
         self._built: dict[int, Any] = {}
         self.lacking: dict[str, set[str]] = {}
         """Dataclass -> fields that it has by default here and that the file lacks."""
@@ -190,19 +200,34 @@ class Reader:
         if kind == "tuple":
             return tuple(self.get(stored, f"{number:04d}") for number in range(int(stored.attrs["@length"])))
         if kind not in self._types:
-            raise StoreError(f"unknown type {kind!r}")
+            raise StoreError(f"unknown type {kind!r}; {reader_of(self._author)}")
         return self.dataclass(stored, self._types[kind])
 
     def dataclass(self, stored: h5py.Group, kind: type) -> Any:
         """The dataclass whose fields are in a group; those that an older version did not have take their defaults."""
-        names = {field.name for field in fields(kind)}
-        there = {name for name in (*stored, *stored.attrs) if name not in RESERVED and not name.startswith("@")}
+        former = self._former.get(kind.__name__, {})
+        present = {former.get(field.name, field.name): field.name for field in fields(kind)}
+        names = set(present.values())
+        found = {name for name in (*stored, *stored.attrs) if name not in RESERVED and not name.startswith("@")}
+        there = {present.get(name, name) for name in found}
         optional = {f.name for f in fields(kind) if f.default is not MISSING or f.default_factory is not MISSING}
         if there - names or names - there - optional:
-            raise StoreError(f"the fields of {kind.__name__} are not those of this version of circuittex")
+            raise StoreError(
+                f"the fields of {kind.__name__} are not those of circuittex {__version__}; {reader_of(self._author)}"
+            )
         if names - there:
             self.lacking[kind.__name__] = names - there
-        return kind(**{name: self.get(stored, name) for name in names & there})
+        return kind(**{name: self.get(stored, former.get(name, name)) for name in names & there})
+
+
+def reader_of(author: str) -> str:
+    """Who can read what this circuittex cannot."""
+    return f"circuittex {author} wrote it and can read it"
+
+
+def _told(value: object, meaning: str) -> str:
+    """What a reader is told of a part: of a dataclass the same wherever it stands, so that it is one object, shared."""
+    return summary(type(value)) if is_dataclass(value) and not isinstance(value, type) else meaning
 
 
 def _scalar(value: Any) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import is_dataclass, replace
 from pathlib import Path
@@ -13,24 +12,27 @@ import h5py
 
 from circuittex.base.atomic import replacing
 from circuittex.base.errors import CircuittexError, StoreError
+from circuittex.base.version import __version__
 from circuittex.design import Design
 from circuittex.results.bifurcation import BranchCheck
 from circuittex.results.discretisation import ErrorEstimate
-from circuittex.results.records import FINDINGS, Finding, Record, Study, with_finding
-from circuittex.results.store.archive import ATTRIBUTES, MEANING, Digests, Reader, Writer, registry
-from circuittex.results.store.journal import Overlay, changing, commit, finish, overlay
+from circuittex.results.records import EXAMINATIONS, Examination, Record, Study, with_examination
+from circuittex.results.store.archive import ATTRIBUTES, MEANING, Digests, Former, Reader, Writer, reader_of, registry
+from circuittex.results.store.journal import Overlay, changing, commit, finish, overlay, snapshot
 from circuittex.results.store.meaning import meanings, summary
 
 FORMAT = "circuittex results"
 VERSION = 2
 """Version of the file layout. Files of version 1 are read; others are refused."""
 OLDEST = 1
-NAME = "results.h5"
+FORMER: Former = {"Record": {"loading": "path"}}
+"""Names of fields in files of version 1."""
+RESULTS = "results.h5"
 """What the file is called in a study's folder."""
 HEAD = ("version", "design", "design_hash", "mesh", "initial")
 """The fields of a `Study` that are known before its first record."""
-NAMES: dict[type[Finding], str] = {ErrorEstimate: "error estimate", BranchCheck: "branch check"}
-"""What findings are called where one is damaged."""
+NAMES: dict[type[Examination], str] = {ErrorEstimate: "error estimate", BranchCheck: "branch check"}
+"""What examinations are called where one is damaged."""
 LIBVER = ("v110", "v110")
 """HDF5 1.10: its metadata carry checksums, and every viewer of the last years reads it."""
 GROUPS = {
@@ -39,8 +41,6 @@ GROUPS = {
     "branches": "Whether round-off chose the branch of a state, by its name.",
     "objects": "Where all of it is stored, each object once, by a digest of its content; every other place links here.",
 }
-TRIES = 20
-"""How often a file is read anew that a run is adding to."""
 
 
 def write_study_start(path: str | Path, study: Study) -> None:
@@ -64,9 +64,9 @@ def write_study_start(path: str | Path, study: Study) -> None:
             file.require_group(name).attrs[MEANING] = meaning
         for record in study.records:
             _add(file, "states", record.name, writer, record)
-        for group in FINDINGS.values():
-            for finding in getattr(study, group):
-                _add(file, group, finding.state, writer, finding)
+        for group in EXAMINATIONS.values():
+            for examination in getattr(study, group):
+                _add(file, group, examination.state, writer, examination)
 
     path = Path(path)
     # HDF5 works in memory only: a full disk then meets plain Python I/O, from which one can recover, and not the HDF5
@@ -91,12 +91,21 @@ def append_record(path: str | Path, record: Record) -> None:
     _append(Path(path), "states", record.name, record)
 
 
-def append_finding(path: str | Path, finding: Finding) -> None:
-    """Add a finding about a recorded state to the results file at `path`, in the manner of `append_record`.
+def append_examination(path: str | Path, examination: Examination) -> None:
+    """Add an examination about a recorded state to the results file at `path`, in the manner of `append_record`.
 
     Errors: `StoreError` as there.
     """
-    _append(Path(path), FINDINGS[type(finding)], finding.state, finding)
+    _append(Path(path), EXAMINATIONS[type(examination)], examination.state, examination)
+
+
+def complete_change(path: str | Path) -> None:
+    """Make the change complete that a kill left half-made at `path`, so that h5py alone reads the file, too.
+
+    Only who may write to the file may call this. Errors: `StoreError` where it cannot be written.
+    """
+    with _as_store_error(Path(path), "cannot be written"):
+        finish(Path(path))
 
 
 def load_study(path: str | Path) -> Study:
@@ -108,39 +117,37 @@ def load_study(path: str | Path) -> Study:
     Errors: `StoreError` where the file is missing, foreign, damaged, or of a newer layout.
     """
     path = Path(path)
-    path = path / NAME if path.is_dir() else path
+    path = path / RESULTS if path.is_dir() else path
     if not path.is_file():
         raise StoreError(f"{path}: there is no results file here")
-    for attempt in range(TRIES):
-        before = changing(path)
+    before = changing(path)
+    with _as_store_error(path, "cannot be read"):
         try:
-            with _as_store_error(path, "cannot be read"):
-                study = _read(path)
-        except StoreError:
-            if changing(path) == before or attempt == TRIES - 1:
+            with path.open("rb") as handle:
+                return _read(overlay(path, handle))
+        except Exception:  # whatever h5py makes of pages that change while it reads them
+            if changing(path) == before:
                 raise
-            time.sleep(0.01 * attempt)
-            continue
-        return study
-    raise AssertionError("the last try returns or raises")
+            return _read(snapshot(path))
 
 
-def _read(path: Path) -> Study:
-    with path.open("rb") as handle, h5py.File(overlay(path, handle), "r") as file:
+def _read(content: Overlay) -> Study:
+    with h5py.File(content, "r") as file:
         version = _check_layout(file)
-        reader = Reader(registry(Study))
+        former: Former = FORMER if version == 1 else {}
+        reader = Reader(registry(Study), former, _author(file))
         start = file if version > 1 else file["study"]
         head = tuple(reader.get(start, name) for name in HEAD)
         records = _members(file["states" if version > 1 else "records"], reader)
-        findings = {kind: _members(file[group], reader) for kind, group in FINDINGS.items() if group in file}
-        digest = Digests(reader.lacking)
+        examinations = {kind: _members(file[group], reader) for kind, group in EXAMINATIONS.items() if group in file}
+        digest = Digests(reader.lacking, former)
         if start.attrs["@digest"] != digest(head):
             raise StoreError("its content does not match its digest")
         study = Study(**dict(zip(HEAD, head, strict=True)), records=())
         study = replace(study, records=_in_order(study.design, _checked(records, "record", digest)))
-        for kind, members in findings.items():
-            for finding in _checked(members, NAMES[kind], digest):
-                study = with_finding(study, finding)
+        for kind, members in examinations.items():
+            for examination in _checked(members, NAMES[kind], digest):
+                study = with_examination(study, examination)
         return replace(study, design=_in_newtons(study.design)) if version == 1 else study
 
 
@@ -151,12 +158,12 @@ def _in_newtons(design: Design) -> Design:
 
 
 def _in_order(design: Design, records: Sequence[Record]) -> tuple[Record, ...]:
-    """The records path by path, whatever the order in which the paths came on; within a path it is theirs."""
+    """The records loading by loading, whatever the order in which these came on; within one it is theirs."""
     rank = {"": 0} | {loading.name: number for number, loading in enumerate(design.loading, start=1)}
-    return tuple(sorted(records, key=lambda record: rank[record.path]))
+    return tuple(sorted(records, key=lambda record: rank[record.loading]))
 
 
-def _append(path: Path, group: str, name: str, value: Record | Finding) -> None:
+def _append(path: Path, group: str, name: str, value: Record | Examination) -> None:
     if not path.is_file():
         raise StoreError(f"{path}: there is no results file here")
     with _as_store_error(path, "cannot be written"), path.open("rb") as handle:
@@ -171,7 +178,7 @@ def _append(path: Path, group: str, name: str, value: Record | Finding) -> None:
         commit(path, changed)
 
 
-def _add(file: h5py.File, group: str, name: str, writer: Writer, value: Record | Finding) -> None:
+def _add(file: h5py.File, group: str, name: str, writer: Writer, value: Record | Examination) -> None:
     members = file[group]
     number = len(members)
     writer.put(members, name, value, summary(type(value)))
@@ -200,11 +207,16 @@ def _check_layout(file: h5py.File) -> int:
         raise StoreError("this is not a results file of circuittex")
     version = int(file.attrs["format_version"])
     if not OLDEST <= version <= VERSION:
-        newer = "a newer circuittex reads it" if version > VERSION else ""
         raise StoreError(
-            f"its layout is version {version}; this circuittex reads {OLDEST} to {VERSION} {newer}".strip()
+            f"its layout is version {version} and circuittex {__version__} reads {OLDEST} to {VERSION}; "
+            f"{reader_of(_author(file))}"
         )
     return version
+
+
+def _author(file: h5py.File) -> str:
+    """The version of circuittex that wrote the file, in any layout."""
+    return str(file.attrs.get("version") or file.get("study", file).attrs.get("version", "of another version"))
 
 
 @contextlib.contextmanager

@@ -3,7 +3,8 @@
 A change is made on an `Overlay`, which keeps what is written to it in memory. `commit` appends what lies beyond the
 old end, which nobody reads yet; writes the few pages inside that change to a journal beside the file; then changes the
 pages and removes the journal. Whatever ends the process, the file with its journal, if there is one, is the new
-version, and without one the old version: `overlay` reads it so, and `finish` ends what was begun.
+version, and without one the old version: `overlay` reads it so, and `finish` ends what was begun. A journal knows how
+long its file is; beside any other one, such as a copy that was put there since, it means nothing.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ PAGE = 4096
 """Bytes that are changed together."""
 SUFFIX = ".journal"
 MAGIC = b"circuittex journal 1\n"
-_HEAD, _ENTRY = struct.Struct("<QQ"), struct.Struct("<QI")  # old size, number of pages; offset, length
+_HEAD, _ENTRY = struct.Struct("<QQ"), struct.Struct("<QI")  # size of the file, number of pages; offset, length
 
 
 class Overlay(io.RawIOBase):
@@ -119,15 +120,25 @@ class Overlay(io.RawIOBase):
 
 def overlay(path: Path, file: BinaryIO) -> Overlay:
     """The file at `path`, open as `file`, as it is to be read: with the changes of a journal that was left there."""
-    size = os.fstat(file.fileno()).st_size
-    return Overlay(file, size, _pages(_journal(path)))
+    size = file.seek(0, os.SEEK_END)
+    return Overlay(file, size, _pages(_journal(path), size))
+
+
+def snapshot(path: Path) -> Overlay:
+    """The file at `path` as it is at one moment, in memory: a change that comes while it is read begins that anew."""
+    while True:
+        before = changing(path)
+        taken = overlay(path, io.BytesIO(path.read_bytes()))
+        if changing(path) == before:
+            return taken
 
 
 def finish(path: Path) -> None:
     """Make the changes of a journal that was left beside the file at `path`, before others are begun."""
     journal = _journal(path)
     if journal.exists():
-        _apply(path, _pages(journal))
+        if path.exists():
+            _apply(path, _pages(journal, path.stat().st_size))
         journal.unlink()
 
 
@@ -173,15 +184,16 @@ def _journal(path: Path) -> Path:
 
 
 def _write_journal(path: Path, changed: Overlay) -> None:
-    content = bytearray(_HEAD.pack(changed.size, len(changed.pages)))
+    content = bytearray(_HEAD.pack(changed.size + len(changed.tail), len(changed.pages)))
     for offset, page in sorted(changed.pages.items()):
         content += _ENTRY.pack(offset, len(page)) + page
     with replacing(path) as partial:
         partial.write_bytes(MAGIC + hashlib.blake2b(content, digest_size=32).digest() + content)
 
 
-def _pages(path: Path) -> dict[int, bytes]:
-    """The pages of a journal; none where there is no journal or it is damaged, which a kill cannot do."""
+def _pages(path: Path, size: int) -> dict[int, bytes]:
+    """The pages of the journal of a file of that size; none where there is no journal, it is of another file, or it is
+    damaged, which a kill cannot do."""
     try:
         data = path.read_bytes()
     except FileNotFoundError:
@@ -190,7 +202,9 @@ def _pages(path: Path) -> dict[int, bytes]:
     content = data[start:]
     if data[: len(MAGIC)] != MAGIC or hashlib.blake2b(content, digest_size=32).digest() != data[len(MAGIC) : start]:
         return {}
-    _, count = _HEAD.unpack_from(content)
+    whole, count = _HEAD.unpack_from(content)
+    if whole != size:
+        return {}
     place, pages = _HEAD.size, {}
     for _ in range(count):
         offset, length = _ENTRY.unpack_from(content, place)

@@ -74,13 +74,13 @@ def quads(nodes: Ints, sides: int) -> Ints:
 def write_collections(folder: str | Path, records: Sequence[Record]) -> tuple[Path, ...]:
     """Write a collection ``<loading path>.pvd`` of the files ``<record name>.vtu`` in `folder` for each loading path.
 
-    Every path starts with the relaxed state; a study without loading gets ``relaxed.pvd``.
+    Every loading starts with the relaxed state; a study without loading gets ``relaxed.pvd``.
     """
-    start = [record for record in records if not record.path]
+    start = [record for record in records if not record.loading]
     written = []
-    for path in dict.fromkeys(record.path for record in records if record.path) or {"relaxed": None}:
-        states = start + [record for record in records if record.path == path]
-        written.append(Path(folder) / f"{path}.pvd")
+    for name in dict.fromkeys(record.loading for record in records if record.loading) or {"relaxed": None}:
+        states = start + [record for record in records if record.loading == name]
+        written.append(Path(folder) / f"{name}.pvd")
         write_pvd(written[-1], [(record.strain, f"{record.name}.vtu") for record in states])
     return tuple(written)
 

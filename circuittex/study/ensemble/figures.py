@@ -55,14 +55,14 @@ def save_bands(ensemble: Ensemble, folder: Path) -> dict[str, Path]:
 
 
 def _figure(ensemble: Ensemble, panels: Sequence[Panel]) -> Figure:
-    paths = list(dict.fromkeys(path for path in ensemble.paths if path)) or [""]
+    loadings = list(dict.fromkeys(name for name in ensemble.loadings if name)) or [""]
     column = {quantity.name: number for number, quantity in enumerate(ensemble.quantities)}
     with style():
-        figure = new_figure(max(3.1 * len(panels), 4.0), 2.9 * len(paths))
-        for row, path in enumerate(paths):
-            states = np.flatnonzero([p in ("", path) for p in ensemble.paths])
+        figure = new_figure(max(3.1 * len(panels), 4.0), 2.9 * len(loadings))
+        for row, loading in enumerate(loadings):
+            states = np.flatnonzero([name in ("", loading) for name in ensemble.loadings])
             for place, (title, label, shown) in enumerate(panels):
-                axes = figure.add_subplot(len(paths), len(panels), row * len(panels) + place + 1)
+                axes = figure.add_subplot(len(loadings), len(panels), row * len(panels) + place + 1)
                 for colour, (quantity, name) in enumerate(shown):
                     values = ensemble.values[:, states, column[quantity]]
                     # the panels of one quantity have the colours of their place, as in the report of a study
@@ -73,7 +73,7 @@ def _figure(ensemble: Ensemble, panels: Sequence[Panel]) -> Figure:
                 _widen(axes)
                 axes.set_title(title)
                 axes.set_ylabel(label)
-                axes.set_xlabel(f"strain ({path})" if path else "strain")
+                axes.set_xlabel(f"strain ({loading})" if loading else "strain")
                 if any(not text.startswith("_") for text in axes.get_legend_handles_labels()[1]):
                     axes.legend()
     return figure

@@ -87,7 +87,7 @@ def table(ensemble: Ensemble) -> str:
         for q, quantity in enumerate(ensemble.quantities):
             numbers = [plain(part[s, q]) for part in (p50, p5, p25, p75, p95)]
             strain = float(ensemble.strains[s])
-            place = [state, ensemble.paths[s], strain, quantity.name, quantity.unit]
+            place = [state, ensemble.loadings[s], strain, quantity.name, quantity.unit]
             writer.writerow([*place, *numbers, int(ensemble.count[s, q])])
     return text.getvalue()
 
@@ -98,7 +98,7 @@ def content(ensemble: Ensemble) -> dict[str, Any]:
     states = [
         {
             "name": name,
-            "path": ensemble.paths[s],
+            "path": ensemble.loadings[s],
             "strain": float(ensemble.strains[s]),
             "count": ensemble.count[s].tolist(),
             "percentiles": {f"p{percent:g}": plain(part[s]) for percent, part in zip(BANDS, parts, strict=True)},

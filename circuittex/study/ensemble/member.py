@@ -17,10 +17,9 @@ from circuittex.base.frozen import frozen
 from circuittex.base.version import __version__
 from circuittex.design import Design, design_hash
 from circuittex.results.records import Record
-from circuittex.results.store import load_study
+from circuittex.results.store import RESULTS, load_study
 from circuittex.results.summary import agrees
 from circuittex.study.ensemble.quantities import measure, quantities
-from circuittex.study.folder import RESULTS
 from circuittex.study.plan import plan
 from circuittex.study.run import run_study
 

@@ -33,7 +33,7 @@ class Ensemble:
     """(M,) names of the states of a member on which the routes to the currents disagree."""
     states: tuple[str, ...]
     """(S,) names, the relaxed state first."""
-    paths: tuple[str, ...]
+    loadings: tuple[str, ...]
     """(S,) name of the loading path of each state; empty for the relaxed state."""
     strains: Floats
     """(S,) the strain that labels each state."""

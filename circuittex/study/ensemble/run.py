@@ -123,7 +123,7 @@ def assembled(design: Design, outcomes: list[Outcome]) -> Ensemble:
         failures=tuple(outcome.failure for outcome in outcomes),
         disagreeing=tuple(outcome.disagreeing for outcome in outcomes),
         states=tuple(step.name for step in steps),
-        paths=tuple(step.path for step in steps),
+        loadings=tuple(step.loading for step in steps),
         strains=np.array([step.strain for step in steps]),
         quantities=quantities(design),
         values=np.stack([outcome.values for outcome in outcomes]),

@@ -32,7 +32,7 @@ FIT = with_network(Fit(0.3, 200.0, 0.0, np.zeros((2, 2)), "relative", (), np.zer
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Study]:
     """The cell of the documentation's example, on fewer elements."""
     folder = tmp_path_factory.mktemp("study")
-    return folder, run_study(small_cell(elements=4)[0], folder)
+    return folder, run_study(small_cell(yarns=4, elements=4)[0], folder)
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +71,7 @@ def test_the_documented_include_runs(finished: tuple[Path, Study]) -> None:
     drive = {"warp2_minus": 1.0, "warp2_plus": 0.0}
     expected = solve_nodal(circuit, drive).port_current[circuit.ports.index("warp2_minus")]
     assert current == pytest.approx(expected, rel=1e-9)
-    assert current > 3 * np.pi * 0.15**2 * 10.0 / 4.0  # Rayleigh: more than the yarn of three fibrils alone
+    assert current > 3 * np.pi * 0.15**2 * 10.0 / 8.0  # Rayleigh: more than the yarn of three fibrils alone
 
 
 def test_sub_circuits_of_a_long_title_differ(pressed: tuple[Design, ContactState]) -> None:

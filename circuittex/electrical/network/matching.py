@@ -226,7 +226,9 @@ def _matched(design: Design, grouping: Groups, target: Floats, model: Model, dat
     def slopes(logs: Floats) -> Floats:
         return both(logs)[1]
 
-    found = least_squares(misfits, start, jac=slopes, bounds=bounds, x_scale="jac", xtol=1e-14, ftol=None, gtol=None)
+    # Without a limit for the slope, a start that fits to the last bit ends in 0 / 0.
+    limits = {"xtol": 1e-14, "ftol": None, "gtol": float(np.finfo(float).eps)}
+    found = least_squares(misfits, start, jac=slopes, bounds=bounds, x_scale="jac", **limits)
     names = [*(f"Ry of {kind}" for kind in grouping.yarns), *(f"Rc of {pair}" for pair in grouping.crossings)]
     reasons, lost = _undetermined(found.jac, names, data)
     return Match(np.exp(found.x), lost, float(np.expm1(np.abs(found.fun).max())), reasons)

@@ -1,0 +1,1 @@
+"""From a study to a folder of SPICE libraries that circuit designers use: strain is an input of the part."""

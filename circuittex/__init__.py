@@ -29,6 +29,7 @@ _HOMES = {
     "relaxation.increment": ("advance",),
     "study.run": ("run_study",),
     "study.ensemble": ("run_ensemble",),
+    "study.library.export": ("export_library",),
     "results.plot": ("cell_figure", "probe_figure", "section_figure"),
     "results.records": ("Record", "Study"),
     "results.store": ("load_study",),
@@ -94,6 +95,7 @@ if TYPE_CHECKING:
     from circuittex.results.records import Study as Study
     from circuittex.results.store import load_study as load_study
     from circuittex.study.ensemble import run_ensemble as run_ensemble
+    from circuittex.study.library.export import export_library as export_library
     from circuittex.study.run import run_study as run_study
 else:
 

@@ -56,6 +56,10 @@ ALLOWED: dict[str, set[str]] = {
         *{"design", "geometry", "study", "results", "results.store"},
         *{"results.plot.style", "results.report.number", "results.report.page", "results.report.template"},
     },
+    "study.library": {
+        *{"design", "study", "results", "electrical.network", "netlist"},
+        *{"results.plot.style", "results.report.number", "results.report.page", "results.report.template"},
+    },
 }
 ANYTHING = {"command", "__main__"}  # the command line, which nobody imports
 
@@ -71,7 +75,7 @@ LIBRARIES: dict[str, set[str]] = {
     "jinja2": {"results.report"},
     "filelock": {"base"},
     "meshio": {"results.vtk"},
-    "matplotlib": {"results.plot", "study.ensemble"},
+    "matplotlib": {"results.plot", "study.ensemble", "study.library"},
     "distributed": {"study.ensemble"},
     "dask": {"study.ensemble"},
 }

@@ -1,4 +1,4 @@
-"""The command line: new, run, netlist, verify, report, ensemble."""
+"""The command line: new, run, netlist, verify, report, ensemble, export."""
 
 from __future__ import annotations
 
@@ -245,6 +245,24 @@ def _ensemble(options: argparse.Namespace) -> ExitCode:
     return ExitCode.PARTLY if ensemble.count.any() else ExitCode.NO_EQUILIBRIUM
 
 
+def _export(options: argparse.Namespace) -> ExitCode:
+    study = _load(options.results)
+    _prepare(options.out)
+    from circuittex.study.library.export import export_library
+
+    cells = export_library(
+        study,
+        options.out,
+        name=options.name,
+        state=options.state,
+        ends=options.ends,
+        thin=options.thin,
+        rise=options.rise,
+    )
+    print(f"{len(cells)} sub-circuits in {options.out}: see {options.out / 'datasheet.html'}")
+    return ExitCode.DONE
+
+
 COMMANDS: dict[str, Callable[[argparse.Namespace], ExitCode]] = {
     "new": _new,
     "run": _run,
@@ -252,6 +270,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], ExitCode]] = {
     "verify": _verify,
     "report": _report,
     "ensemble": _ensemble,
+    "export": _export,
 }
 
 

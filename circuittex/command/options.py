@@ -39,6 +39,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_verify(commands)
     _add_report(commands)
     _add_ensemble(commands)
+    _add_export(commands)
     return parser
 
 
@@ -201,6 +202,40 @@ def _add_ensemble(commands: Commands) -> None:
         "--scheduler",
         metavar="ADDRESS",
         help="a running Dask scheduler, such as tcp://node1:8786; its workers need circuittex and must share DIR",
+    )
+
+
+def _add_export(commands: Commands) -> None:
+    parser = _command(
+        commands,
+        "export",
+        "write a folder of SPICE libraries in which strain is an input, with a datasheet",
+        "Writes the sub-circuits of a computed study for ngspice, LTspice, Xyce and gnucap: the detailed network,\n"
+        "its exact reduction to the pins, a cell of Ry and Rc, and one crossing; and for each loading the same with\n"
+        "strain as a parameter (..._s) or as the voltage of a pin (..._v, 1 V for 100 %). Beside them examples that\n"
+        "run as they stand, library.json, and datasheet.html with the error of each level.",
+        "circuittex export results/plain_weave --out fabric_lib",
+    )
+    _add_results(parser)
+    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder of the library; made if missing")
+    parser.add_argument("--name", default="fabric", help="first word of all sub-circuits' names (default: fabric)")
+    parser.add_argument("--state", metavar="NAME", default="", help="state of what has no strain (default: relaxed)")
+    parser.add_argument(
+        "--ends",
+        choices=("crimped", "free"),
+        default="crimped",
+        help="crimped: a pin for each yarn end that joins its fibrils (default); free: a pin for each terminal of the "
+        "design, and the fibril ends of no terminal are insulated one by one",
+    )
+    parser.add_argument(
+        "--thin",
+        metavar="ERROR",
+        type=float,
+        default=0.0,
+        help="write also ports with fewer resistors, of which no resistance is off by more than this part: 0.001",
+    )
+    parser.add_argument(
+        "--rise", metavar="K", type=float, default=10.0, help="temperature rise of the rated currents (default: 10 K)"
     )
 
 

@@ -9,8 +9,9 @@ from collections.abc import Iterable
 
 _SAFE = re.compile(r"[a-z][a-z0-9_]*")
 _UNSAFE_RUN = re.compile(r"[^a-z0-9]+")
-# Ground has several names, and a node called like one of these would silently be grounded.
-_RESERVED = frozenset({"gnd", "ground"})
+# Ground has several names, and a node called like one of these would silently be grounded; the others are quantities in
+# the expressions of sources.
+_RESERVED = frozenset({"gnd", "ground", "temp", "temper", "time", "hertz"})
 # PySpice and some simulators have line buffers: nobody needs longer words.
 _LONGEST = 80
 # What stands for the text that a long word leaves out: enough digits that no two texts of a design share them.

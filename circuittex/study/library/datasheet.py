@@ -1,0 +1,112 @@
+"""datasheet.html: one page with what each level of a library costs and errs, and what the part stands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path as File
+from typing import Any
+
+import numpy as np
+
+from circuittex.base.atomic import write_text
+from circuittex.results.records import Study
+from circuittex.results.report.number import number
+from circuittex.results.report.page import picture
+from circuittex.results.report.template import render
+from circuittex.study.library.accuracy import Errors
+from circuittex.study.library.cell import Cell
+from circuittex.study.library.facts import GOOD, Facts
+from circuittex.study.library.figures import save_figures
+
+CAPTIONS = {
+    "errors_cell": "Largest error of the cell of Ry and Rc at each pair of pins, over all states.",
+    "errors_ports_thin": "Largest error of the thinned ports at each pair of pins, over all states.",
+    "strain": "Change of the resistance between two pins, all others open: computed states and what the cells answer.",
+    "network": "Medians of Ry and Rc of the fitted cell.",
+}
+MISSING = {
+    "Corners and Monte Carlo": "not available: the library is made of one study, not of an ensemble",
+    "Temperature coefficient": "not available: the conductivities of the design do not depend on temperature",
+    "Capacitance, inductance": "not available: the model has no answer",
+    "Power rating": "the rated current squared times the resistance of the probe",
+}
+
+
+def write_datasheet(folder: File, study: Study, known: Facts, cells: Sequence[Cell]) -> File:
+    """Draw the figures into ``folder/figures`` and write ``folder/datasheet.html``; returns its path."""
+    pictures = save_figures(known, folder / "figures")
+    path = folder / "datasheet.html"
+    text = render(
+        "datasheet.html",
+        "circuittex.study.library",
+        title=study.design.name,
+        known=_facts(study, known),
+        kind="good",
+        sentences=[_recommendation(known)],
+        errors=_errors(known),
+        left_out=_left_out(known),
+        cells=_cells(cells),
+        ratings=_ratings(study, known),
+        rise=number(known.rise),
+        missing=MISSING,
+        figures=[picture(CAPTIONS[name], png) for name, png in pictures.items()],
+        version=study.version,
+    )
+    write_text(path, str(text))
+    return path
+
+
+def _facts(study: Study, known: Facts) -> dict[str, str]:
+    return {
+        "Design hash": study.design_hash,
+        "Recorded states": str(len(study.records)),
+        "Yarn ends": known.ends,
+        "Pins": ", ".join(known.levels.pins),
+        "Strain": "; ".join(
+            f"{path.word}: {100 * path.strain[0]:.4g} % to {100 * path.strain[-1]:.4g} %, {len(path.strain)} states"
+            for path in known.paths
+        )
+        or "one state only: strain is no input",
+    }
+
+
+def _recommendation(known: Facts) -> str:
+    if known.recommended == "cell":
+        return f"Recommended: cell. It errs by at most {100 * GOOD:g} % at every pair of pins in every state."
+    why = known.levels.reason or f"the cell of Ry and Rc errs by more than {100 * GOOD:g} %"
+    return f"Recommended: ports, which are exact; {why}."
+
+
+def _errors(known: Facts) -> dict[str, Any]:
+    head = ["level", "resistance, worst", "median", "change, worst", "median"]
+    return {"head": head, "rows": [_row(level, errors) for level, errors in known.errors.items()]}
+
+
+def _left_out(known: Facts) -> dict[str, Any]:
+    head = ["path", "resistance, worst", "median", "change, worst", "median"]
+    return {"head": head, "rows": [_row(word, errors) for word, errors in known.left_out.items()]}
+
+
+def _row(name: str, errors: Errors) -> list[str]:
+    (R, c), (Rm, cm) = errors.worst, errors.median
+    return [name, *(f"{number(100 * each, 3)} %" for each in (R, Rm, c, cm))]
+
+
+def _cells(cells: Sequence[Cell]) -> dict[str, Any]:
+    rows: dict[str, list[str]] = {}
+    for cell in cells:
+        rows.setdefault(cell.name, [cell.name, cell.title, cell.dialect])[2] += (
+            "" if rows[cell.name][2].split(", ")[-1] == cell.dialect else f", {cell.dialect}"
+        )
+    return {"head": ["sub-circuit", "what it is", "folders"], "rows": list(rows.values())}
+
+
+def _ratings(study: Study, known: Facts) -> dict[str, Any]:
+    """Smallest rated current of each probe over the states."""
+    rows = []
+    for probe, column in zip(study.design.probes, known.rated.T, strict=True):
+        there = ~np.isnan(column)
+        if there.any():
+            k = int(np.flatnonzero(there)[np.argmin(column[there])])
+            rows.append([probe.name, f"{number(float(column[k]))} A", study.records[k].name])
+    return {"head": ["probe", "current", "in state"], "rows": rows}

@@ -1,0 +1,42 @@
+"""What differs between the programs that read a library: how each of them writes a choice, a parameter, a source.
+
+ngspice and gnucap run in the tests; LTspice and Xyce are written after their manuals, and checked against these.
+"""
+
+from __future__ import annotations
+
+from circuittex.base.frozen import frozen
+
+
+@frozen
+class Dialect:
+    """How one program wants what the others write otherwise."""
+
+    name: str
+    """'ngspice', 'ltspice', 'xyce' or 'gnucap'."""
+    choice: str
+    """A choice by a condition, with the fields `if_`, `then` and `other`; empty where strain can be no input."""
+    expression: str
+    """A behavioural source's expression, with the field `of`."""
+    parameters: str
+    """What stands before the parameters of a `.subckt` card."""
+
+    def choose(self, if_: str, then: str, other: str) -> str:
+        """An expression that is `then` or `other`.
+
+        >>> DIALECTS["ltspice"].choose("x<1", "a", "b")
+        'if(x<1,a,b)'
+        """
+        return self.choice.format(if_=if_, then=then, other=other)
+
+
+DIALECTS = {
+    dialect.name: dialect
+    for dialect in (
+        Dialect("ngspice", "({if_} ? {then} : {other})", "{of}", ""),
+        Dialect("ltspice", "if({if_},{then},{other})", "{of}", ""),
+        Dialect("xyce", "IF({if_},{then},{other})", "{{{of}}}", "PARAMS: "),
+        Dialect("gnucap", "", "", ""),
+    )
+}
+"""The programs by name. Only Xyce's manual asks for `PARAMS:`, at which other readers stop."""

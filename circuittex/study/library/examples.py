@@ -1,0 +1,65 @@
+"""Decks that run as they stand and use the library: a resistance, strain as a parameter, strain as a pin, probes."""
+
+from __future__ import annotations
+
+from circuittex.design import Design, Probe
+from circuittex.electrical.network.circuit import Circuit, yarn_end_name
+from circuittex.netlist import Header, deck
+from circuittex.study.library.cell import Cell
+from circuittex.study.library.dialect import DIALECTS
+
+OHMMETER = "1 V between the first two pins, all others open; what flows in is minus the current of the source"
+SINE = {"ltspice": "SINE"}
+"""How the source is called where it is not SIN."""
+
+
+def example_deck(cell: Cell, low: float, high: float) -> str:
+    """A deck that measures between the first two pins, to stand in a folder beside that of the cell's file.
+
+    `low` and `high` are the smallest and largest sampled strain; they do not matter where strain is no input.
+    """
+    if cell.parameters:
+        return _parameter(cell, low, high)
+    return _pin(cell, low, high) if any(pin.kind == "control" for pin in cell.pins) else _resistance(cell)
+
+
+def _resistance(cell: Cell) -> str:
+    # A sweep of one point: gnucap and LTspice print and measure nothing of an operating point.
+    return _deck(cell, OHMMETER, ["V1 in 0 1", _call(cell), ".print dc v(in) i(V1)", ".dc V1 1 1 1"])
+
+
+def _parameter(cell: Cell, low: float, high: float) -> str:
+    what = f"{OHMMETER}; at the lowest strain, amid the range, and beyond it, where the flag is up"
+    lines = []
+    for number, strain in enumerate((low, (low + high) / 2, 2 * high - low), 1):
+        given = f" {DIALECTS[cell.dialect].parameters}strain={strain!r}"
+        lines += [f"V{number} in_{number} 0 1", _call(cell, f"_{number}") + given]
+    show = "i(V1) i(V2) i(V3) v(out_of_range_1) v(out_of_range_3)"
+    return _deck(cell, what, [*lines, f".print dc {show}", ".dc V1 1 1 1"])
+
+
+def _pin(cell: Cell, low: float, high: float) -> str:
+    sine = f"{SINE.get(cell.dialect, 'SIN')}({(low + high) / 2!r} {(high - low) / 2!r} 100 0 0 -90)"
+    lines = ["V1 in 0 1", f"Vstrain strain 0 {sine}", _call(cell), ".print tran v(strain) i(V1) v(out_of_range)"]
+    if cell.dialect != "xyce":
+        lines.append(".meas tran i_stretched FIND i(V1) AT=5m")
+    return _deck(cell, f"{OHMMETER}; strain breathes once through its range in 10 ms", [*lines, ".tran 20u 10m"])
+
+
+def _deck(cell: Cell, what: str, lines: list[str]) -> str:
+    return "\n".join([f"* {cell.name}: {what}", f".include ../{cell.file}", *lines, ".end", ""])
+
+
+def _call(cell: Cell, end: str = "") -> str:
+    """The card of an instance; its nodes are called like the pins, the first one 'in', the second is ground."""
+    first, second = [pin.name for pin in cell.pins if pin.kind == "electrical"][:2]
+    nodes = ["0" if pin.name == second else f"{'in' if pin.name == first else pin.name}{end}" for pin in cell.pins]
+    return f"X1{end} {' '.join(nodes)} {cell.name}"
+
+
+def crimped_probe(design: Design, circuit: Circuit, probe: Probe, state: str) -> str:
+    """A probe's deck on the circuit that has a port for each yarn end: the answer of the sub-circuits."""
+    ends = {terminal.name: [yarn_end_name(yarn, side) for yarn, side in terminal.ends] for terminal in design.terminals}
+    drive = dict.fromkeys(ends[probe.source], probe.voltage) | dict.fromkeys(ends[probe.sink], 0.0)
+    title = f"detailed resistor network, probe {probe.name}, the fibrils of every yarn end joined"
+    return deck(circuit, drive, Header(title, design.name, state=state))

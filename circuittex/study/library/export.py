@@ -1,0 +1,152 @@
+"""A study becomes a folder of libraries: `circuittex export`."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path as File
+
+import numpy as np
+
+from circuittex.base.atomic import write_text
+from circuittex.base.errors import CircuittexWarning, DesignError
+from circuittex.base.version import __version__
+from circuittex.electrical.network.names import safe_name
+from circuittex.results.records import Study
+from circuittex.study.export import probe_netlist, simplified
+from circuittex.study.library.cell import DIALECTS, Cell
+from circuittex.study.library.datasheet import write_datasheet
+from circuittex.study.library.examples import crimped_probe, example_deck
+from circuittex.study.library.facts import Facts, facts_of
+from circuittex.study.library.levels import CRIMPED, ENDS, FREE, detailed
+from circuittex.study.library.parts import Part, fixed_parts, strained_parts, thin_part
+from circuittex.study.library.subcircuit import library_text
+from circuittex.study.plan import plan
+
+FORMAT = 1
+"""Of library.json."""
+
+
+def export_library(
+    study: Study,
+    folder: str | File,
+    *,
+    name: str = "fabric",
+    state: str = "",
+    ends: str = CRIMPED,
+    thin: float = 0.0,
+    dialects: Sequence[str] = DIALECTS,
+    rise: float = 10.0,
+) -> tuple[Cell, ...]:
+    """Write the sub-circuits of a study into `folder`, with library.json, examples and datasheet.html.
+
+    Names of sub-circuits begin with `name` and are the same for every study and state. Cells in which strain is no
+    input are of `state`, the first recorded one unless named. `ends`: see `ENDS`. With `thin` > 0 there are also ports
+    with fewer resistors, whose resistances rise by at most that part. Ratings are for `rise` kelvin.
+
+    Raises `DesignError` for an argument and `CircuitError` for a study that cannot be used.
+    """
+    chosen = _checked(study, state, ends, thin, dialects, rise)
+    _note_missing(study)
+    known = facts_of(study, ends, thin, rise)
+    word = safe_name(name) + ("_free" if ends == FREE else "")
+    found = list(_parts(study, known, word, chosen, ends))
+    folder = File(folder)
+    cells = [
+        _write(folder, study, known, part, dialect, chosen)
+        for dialect in dialects
+        for part in found
+        if dialect != "gnucap" or not part.path
+    ]
+    ranges = {part.name: (float(part.network.strain[0]), float(part.network.strain[-1])) for part in found}
+    _write_examples(folder / "examples", cells, ranges)
+    _write_probes(folder / "examples", study, chosen)
+    write_datasheet(folder, study, known, cells)
+    library = {
+        "format": FORMAT,
+        "circuittex": __version__,
+        "design": study.design.name,
+        "design_hash": study.design_hash,
+        "state": study.records[chosen].name,
+        "ends": ends,
+        "recommended": known.recommended,
+        "errors": {level: {"worst": each.worst, "median": each.median} for level, each in known.errors.items()},
+        "cells": [asdict(cell) for cell in cells],
+    }
+    write_text(folder / "library.json", json.dumps(library, indent=1) + "\n", encoding="ascii")
+    return tuple(cells)
+
+
+def _checked(study: Study, state: str, ends: str, thin: float, dialects: Sequence[str], rise: float) -> int:
+    """The number of the state, after all arguments have been found usable."""
+    if ends not in ENDS:
+        raise DesignError("ends", ends, f"it must be one of {', '.join(ENDS)}")
+    if not 0.0 <= thin < 1.0:
+        raise DesignError("thin", thin, "it must be an error from 0 to less than 1, such as 0.001")
+    if not (0.0 < rise < np.inf):
+        raise DesignError("rise", rise, "it must be > 0 K")
+    if unknown := [each for each in dialects if each not in DIALECTS]:
+        raise DesignError("dialects", unknown[0], f"it must be one of {', '.join(DIALECTS)}")
+    names = [record.name for record in study.records]
+    if state and state not in names:
+        raise DesignError("state", state, f"recorded states: {', '.join(names) or 'none'}")
+    return names.index(state) if state else 0
+
+
+def _note_missing(study: Study) -> None:
+    """Say which states of the design are not there, and where strain is no input."""
+    there = {record.name for record in study.records}
+    if missing := [step.name for step in plan(study.design) if step.name not in there]:
+        text = f"the study is not finished: without {', '.join(missing)} strain is sampled less far or less closely"
+        warnings.warn(text, CircuittexWarning, stacklevel=3)
+    elif len(there) == 1:
+        text = "the study has one state: strain is no input of its library"
+        warnings.warn(text, CircuittexWarning, stacklevel=3)
+
+
+def _parts(study: Study, known: Facts, word: str, chosen: int, ends: str) -> Iterator[Part]:
+    design = study.design
+    circuit = detailed(design, study.records[chosen], ends)
+    yield from fixed_parts(word, design, known.levels, chosen, circuit)
+    if known.thin:
+        yield thin_part(word, design, known.thin[chosen], known.thin_error)
+    for path in known.paths:
+        yield from strained_parts(word, design, known.levels, path, {"_thin": known.thin} if known.thin else {})
+
+
+def _write(folder: File, study: Study, known: Facts, part: Part, dialect: str, chosen: int) -> Cell:
+    """Write the file of one sub-circuit in one dialect."""
+    cell = Cell(part.name, part.level, part.title, part.pins, part.parameters, f"{dialect}/{part.name}.lib", dialect)
+    state = f"strain of {part.path}" if part.path else study.records[chosen].name
+    notes = [("design", study.design.name), ("design hash", study.design_hash), ("state", state), *known.notes(part)]
+    path = folder / cell.file
+    path.parent.mkdir(parents=True, exist_ok=True)
+    _write_ascii(path, library_text(cell, part.network, notes))
+    return cell
+
+
+def _write_examples(folder: File, cells: Sequence[Cell], ranges: dict[str, tuple[float, float]]) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for cell in cells:
+        if cell.level != "detailed":
+            _write_ascii(folder / f"{cell.dialect}_{cell.name}.cir", example_deck(cell, *ranges[cell.name]))
+
+
+def _write_probes(folder: File, study: Study, chosen: int) -> None:
+    """A deck of each probe for either meaning of the ends of yarns that it does not drive."""
+    record, design = study.records[chosen], study.design
+    if not design.probes:
+        return
+    joined = detailed(design, record, CRIMPED)
+    simple = simplified(design, record.contacts)
+    for probe in design.probes:
+        word = safe_name(probe.name)
+        _write_ascii(folder / f"probe_{word}_free.cir", probe_netlist(design, record.name, simple, probe))
+        _write_ascii(folder / f"probe_{word}_crimped.cir", crimped_probe(design, joined, probe, record.name))
+
+
+def _write_ascii(path: File, text: str) -> None:
+    """The same bytes on every system: no CR before the LF."""
+    write_text(path, text, encoding="ascii")

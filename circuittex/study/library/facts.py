@@ -1,0 +1,100 @@
+"""What a library says of itself: levels, paths, errors of what is written, and which level to use."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from circuittex.base.arrays import Floats
+from circuittex.base.frozen import frozen
+from circuittex.electrical.network.ports import PortMatrix, port_matrix
+from circuittex.results.records import Study
+from circuittex.study.library.accuracy import Errors, pair_errors
+from circuittex.study.library.interpolation import without
+from circuittex.study.library.levels import CRIMPED, Levels, levels
+from circuittex.study.library.network import matrix_at, ports_network
+from circuittex.study.library.parts import Part
+from circuittex.study.library.path import Path, paths
+from circuittex.study.library.rating import rated_currents
+from circuittex.study.library.thinning import thinned
+
+GOOD = 0.01
+"""A level is recommended where no pair of pins in any state errs by more, in resistance and in its change."""
+JOINED = "crimped: the fibrils of every yarn end are joined in its pin"
+APART = "free: pins are the design's terminals; fibril ends of no terminal are insulated one by one"
+
+
+@frozen
+class Facts:
+    """What was found out about a study before its library is written."""
+
+    levels: Levels
+    """What stands between the pins in every state."""
+    thin: tuple[PortMatrix, ...]
+    """(S,) the ports without those resistors that matter least; empty unless asked for."""
+    thin_error: float
+    """By which part a resistance of these may rise."""
+    paths: tuple[Path, ...]
+    """The ways along which strain is an input."""
+    errors: dict[str, Errors]
+    """Of 'cell' and 'ports_thin', in all states, where they are there."""
+    left_out: dict[str, Errors]
+    """By the word of a path: errors of its inner states found from all others."""
+    rise: float
+    """K: what the rated currents warm the hottest fibril by."""
+    rated: Floats
+    """(S, n) rated current of each probe in each state, A."""
+    ends: str
+    """'crimped' or 'free'."""
+
+    @property
+    def recommended(self) -> str:
+        """'cell' where it errs by at most `GOOD`, else 'ports', which are exact."""
+        worst = self.errors["cell"].worst if "cell" in self.errors else (np.inf,)
+        return "cell" if np.nanmax(worst) <= GOOD else "ports"
+
+    def notes(self, part: Part) -> list[tuple[str, str]]:
+        """What the comments of a file say of its errors."""
+        found = [("yarn ends", JOINED if self.ends == CRIMPED else APART)]
+        level = "ports_thin" if "ports_thin" in part.name else part.level
+        if level in self.errors:
+            found.append(("errors over all pairs of pins and all states", _words(self.errors[level])))
+        elif part.level == "ports":
+            found.append(("errors", "none: the exact reduction of the detailed network to its pins"))
+        if part.path in self.left_out:
+            found.append(("errors of each inner state interpolated from the others", _words(self.left_out[part.path])))
+        if part.path:
+            low, high = part.network.strain[[0, -1]].tolist()
+            found.append(("strain", f"from {low!r} to {high!r}; beyond, the last values, and out_of_range is 1 V"))
+        return found
+
+
+def facts_of(study: Study, ends: str, thin: float, rise: float) -> Facts:
+    """Reduce, fit, thin and compare."""
+    known = levels(study, ends)
+    errors = {}
+    if not known.reason:
+        found = [port_matrix(circuit, known.pins) for circuit in known.cells]
+        errors["cell"] = pair_errors(known.ports, found)
+    less = thinned(known.ports, thin) if thin else ()
+    if less:
+        errors["ports_thin"] = pair_errors(known.ports, less)
+    ways = paths(study)
+    left = {way.word: _left_out(known, way) for way in ways if len(way.strain) > 2}
+    return Facts(known, less, thin, ways, errors, left, rise, rated_currents(study, rise), ends)
+
+
+def _left_out(known: Levels, way: Path) -> Errors:
+    """Errors of the ports of each inner state of a path where they are interpolated from all others."""
+    own = [known.ports[k] for k in way.records]
+    network = ports_network(own, way.strain)
+    inner = range(1, len(own) - 1)
+    found = [matrix_at(network, without(network.strain, network.conductance, k)) for k in inner]
+    relaxed = own[int(np.argmin(np.abs(way.strain)))]
+    return pair_errors([relaxed, *own[1:-1]], [relaxed, *found])
+
+
+def _words(errors: Errors) -> str:
+    (R, c), (Rm, cm) = errors.worst, errors.median
+    if np.isnan(c):
+        return f"resistance {R:.2%} at worst, {Rm:.2%} in the median; nothing changes by more than 1 %"
+    return f"resistance {R:.2%} at worst, {Rm:.2%} in the median; its change {c:.2%} at worst, {cm:.2%} in the median"

@@ -1,0 +1,93 @@
+"""Resistors between the pins of a sub-circuit, whose conductances are known at one or more strains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from circuittex.base.arrays import Floats
+from circuittex.base.errors import CircuitError
+from circuittex.base.frozen import frozen
+from circuittex.electrical.network.circuit import Circuit
+from circuittex.electrical.network.names import unique_names
+from circuittex.electrical.network.ports import PortMatrix, port_matrix
+
+FLOOR = 1e-9
+"""What opens in some states of a path and not in others keeps this part of its smallest conductance: the logarithm of
+none has no value between states, and a resistor that reaches none stops a transient."""
+
+
+@frozen
+class Network:
+    """R resistors, P pins, K states."""
+
+    pins: tuple[str, ...]
+    """(P,) words; the nodes that are no pin are inside."""
+    names: tuple[str, ...]
+    """(R,) of the resistors, without the letter of their card."""
+    nodes: tuple[tuple[str, str], ...]
+    """(R,) the two nodes of each resistor, words."""
+    strain: Floats
+    """(K,) rising; one value where strain is no input."""
+    conductance: Floats
+    """(K, R) S, positive."""
+
+
+def ports_network(matrices: Sequence[PortMatrix], strain: Floats) -> Network:
+    """A resistor between each two pins that anything joins: the exact reduction, -G_ij.
+
+    >>> matrix = PortMatrix(("a", "b"), np.array([[0.5, -0.5], [-0.5, 0.5]]))
+    >>> ports_network([matrix], np.zeros(1)).conductance.tolist()
+    [[0.5]]
+    """
+    pins = unique_names(matrices[0].ports)
+    i, j = np.triu_indices(len(pins), 1)
+    siemens = -np.array([matrix.conductance[i, j] for matrix in matrices])
+    there = (siemens > 0.0).any(axis=0)
+    ends = [(pins[a], pins[b]) for a, b in zip(i[there].tolist(), j[there].tolist(), strict=True)]
+    return Network(pins, tuple(f"{a}_{b}" for a, b in ends), tuple(ends), strain, _positive(siemens[:, there]))
+
+
+def circuit_network(circuits: Sequence[Circuit], strain: Floats, pins: Sequence[str]) -> Network:
+    """The network of circuits of the same shape; of their ports those called as in `pins`, in that order."""
+    first = circuits[0]
+    if any(each.resistor_names != first.resistor_names for each in circuits):
+        raise CircuitError("the networks of the states differ in shape: they cannot be one sub-circuit")
+    words = unique_names(first.node_names)
+    place = {name: words[node] for name, node in zip(first.ports, first.port_node.tolist(), strict=True)}
+    ends = [(words[a], words[b]) for a, b in first.resistor_nodes.tolist()]
+    return Network(
+        tuple(place[name] for name in pins),
+        unique_names(first.resistor_names),
+        tuple(ends),
+        strain,
+        1.0 / np.array([each.resistance for each in circuits]),
+    )
+
+
+def matrix_at(network: Network, conductance: Floats) -> PortMatrix:
+    """The port matrix of a network with these conductances (R,)."""
+    number = {name: k for k, name in enumerate(dict.fromkeys([*network.pins, *(n for e in network.nodes for n in e)]))}
+    pairs = np.array([[number[a], number[b]] for a, b in network.nodes], dtype=np.int64).reshape(-1, 2)
+    circuit = Circuit(
+        node_names=tuple(number),
+        node_fibril=np.full(len(number), -1),
+        node_xi=np.full(len(number), np.nan),
+        resistor_nodes=pairs,
+        resistance=1.0 / conductance,
+        resistor_names=network.names,
+        resistor_kind=np.full(len(pairs), 2),
+        ports=network.pins,
+        port_node=np.arange(len(network.pins)),
+        merged_feet=0,
+        dropped_contacts=0,
+        unreached=np.empty(0, dtype=np.int64),
+    )
+    return port_matrix(circuit)
+
+
+def _positive(siemens: Floats) -> Floats:
+    """(K, R) the conductances, what is none in some states lifted to `FLOOR` of the smallest of the others."""
+    smallest = np.where(siemens > 0.0, siemens, np.inf).min(axis=0, initial=np.inf)
+    return np.asarray(np.maximum(siemens, FLOOR * smallest))

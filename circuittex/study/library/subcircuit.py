@@ -1,0 +1,125 @@
+"""The text of one library file: comments, and one sub-circuit with nothing outside."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+
+import numpy as np
+
+from circuittex.base.version import __version__
+from circuittex.study.library.cell import Cell
+from circuittex.study.library.dialect import DIALECTS, Dialect
+from circuittex.study.library.interpolation import Pieces, pieces
+from circuittex.study.library.network import Network
+
+STRAIN, FLAG, USED = "strain", "out_of_range", "strain_used"
+"""Names of what drives a strained cell: the parameter or pin, the pin that flags, and what is used inside."""
+SLACK = 1e-6
+"""A strain this part of the range beyond its ends is at the end: a source's rounding raises no flag."""
+OPEN = 1e9
+"""ohm between the pin of strain and ground: left open it is 0."""
+
+
+def library_text(cell: Cell, network: Network, notes: Sequence[tuple[str, str]]) -> str:
+    """One file: comments with `notes` (key, text) of which no text can become a card, then the sub-circuit."""
+    body = "\n".join(_subcircuit(cell, network))
+    digest = hashlib.sha256(body.encode("ascii")).hexdigest()
+    head = [
+        f"* circuittex {__version__} library: {cell.name}",
+        f"* {json.dumps(cell.title)}",
+        f"* content: sha256 {digest}",
+        f"* dialect: {cell.dialect}",
+        *(f"* {key}: {json.dumps(text)}" for key, text in notes),
+    ]
+    return "\n".join([*head, body, ""])
+
+
+def _subcircuit(cell: Cell, network: Network) -> list[str]:
+    dialect = DIALECTS[cell.dialect]
+    card = [".subckt", cell.name, *(pin.name for pin in cell.pins)]
+    if cell.parameters:
+        card.append(dialect.parameters + " ".join(f"{name}={value}" for name, value in cell.parameters))
+    lines = [" ".join(card), *(f"* pin: {pin.name} {pin.kind} {pin.side}" for pin in cell.pins)]
+    if len(network.strain) == 1:
+        lines += _fixed(network)
+    else:
+        lines += _by_parameter(network, dialect) if cell.parameters else _by_pin(network, dialect)
+    return [*lines, f".ends {cell.name}"]
+
+
+def _fixed(network: Network) -> list[str]:
+    """A resistor each."""
+    ohm = (1.0 / network.conductance[0]).tolist()
+    return [f"R{name} {a} {b} {value!r}" for name, (a, b), value in zip(network.names, network.nodes, ohm, strict=True)]
+
+
+def _by_parameter(network: Network, dialect: Dialect) -> list[str]:
+    """Resistors whose values follow the parameter, and a source for the flag."""
+    found = pieces(network.strain, network.conductance)
+    lines = [f".param {USED}={{{_clamped(STRAIN, found)}}}"]
+    lines += [
+        f"R{name} {a} {b} {{exp(-{_log_conductance(found, k, USED, dialect)})}}"
+        for k, (name, (a, b)) in enumerate(zip(network.names, network.nodes, strict=True))
+    ]
+    return [*lines, f"V{FLAG} {FLAG} 0 {{{_outside(STRAIN, found, dialect)}}}"]
+
+
+def _by_pin(network: Network, dialect: Dialect) -> list[str]:
+    """Sources whose conductances follow the voltage of a pin.
+
+    Each logarithm is the voltage of a node of its own: only one derivative of the long expression is needed, which
+    makes a transient three times as fast. It is held between those of the samples also where a simulator tries on
+    its way what is no solution, so that the conductance is positive and finite always.
+    """
+    found = pieces(network.strain, network.conductance)
+    lines = [f"R{STRAIN} {STRAIN} 0 {OPEN!r}"]
+    lines.append(f"B{USED} {USED} 0 V={dialect.expression.format(of=_clamped(f'V({STRAIN})', found))}")
+    for k, (name, (a, b)) in enumerate(zip(network.names, network.nodes, strict=True)):
+        log = f"log_{k + 1}"
+        low, high = found.bounds[:, k].tolist()
+        of = _log_conductance(found, k, f"V({USED})", dialect)
+        lines.append(f"B{log} {log} 0 V={dialect.expression.format(of=of)}")
+        of = f"V({a},{b})*exp(min(max(V({log}),{low!r}),{high!r}))"
+        lines.append(f"B{name} {a} {b} I={dialect.expression.format(of=of)}")
+    of = _outside(f"V({STRAIN})", found, dialect)
+    return [*lines, f"B{FLAG} {FLAG} 0 V={dialect.expression.format(of=of)}"]
+
+
+def _clamped(strain: str, found: Pieces) -> str:
+    """The strain within the sampled range."""
+    return f"min(max({strain},{float(found.knots[0])!r}),{float(found.knots[-1])!r})"
+
+
+def _outside(strain: str, found: Pieces, dialect: Dialect) -> str:
+    """1 where a strain is outside the sampled range, else 0."""
+    slack = SLACK * float(found.knots[-1] - found.knots[0])
+    low, high = float(found.knots[0]) - slack, float(found.knots[-1]) + slack
+    return dialect.choose(f"{strain}<{low!r}", "1", dialect.choose(f"{strain}>{high!r}", "1", "0"))
+
+
+def _log_conductance(found: Pieces, resistor: int, strain: str, dialect: Dialect) -> str:
+    """The logarithm of a conductance in S: the cubic of the piece in which a strain lies, found by halving."""
+    cubics = found.coefficients[:, :, resistor].T.tolist()
+    knots = found.knots.tolist()
+
+    def between(first: int, last: int) -> str:
+        if last - first == 1:
+            return _cubic(strain, knots[first], cubics[first])
+        middle = (first + last) // 2
+        return dialect.choose(f"{strain}<{knots[middle]!r}", between(first, middle), between(middle, last))
+
+    return f"({between(0, len(cubics))})"
+
+
+def _cubic(strain: str, start: float, coefficients: Sequence[float]) -> str:
+    """c_0 + t (c_1 + t (c_2 + t c_3)) with t = strain - start."""
+    t = strain if start == 0.0 else f"({strain}-({start!r}))"
+    c0, c1, c2, c3 = coefficients
+    return f"({c0!r})+{t}*(({c1!r})+{t}*(({c2!r})+{t}*({c3!r})))"
+
+
+def counted(network: Network) -> str:
+    """How large a network is, in words."""
+    return f"{len(network.names)} resistors, {len(np.unique(network.nodes))} nodes"

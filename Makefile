@@ -9,7 +9,7 @@ PYTEST_ARGS ?= -n auto
 PY := $(VENV)/bin/python
 export VENV PYTHON
 
-.PHONY: run paper test test-oldest lint style types docs clean ngspice help
+.PHONY: run paper test test-oldest lint style types docs clean ngspice gnucap help
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -23,12 +23,13 @@ paper: $(VENV)/.ready ngspice ## the whole study of the paper for both parameter
 	$(PY) -m circuittex run examples/paper_table.toml --out results/paper_table
 	$(PY) -m circuittex report results/paper --beside results/paper_table
 
-test: $(VENV)/.ready ngspice ## run the whole test suite
+test: $(VENV)/.ready ngspice gnucap ## run the whole test suite
 	$(PY) -m pytest $(PYTEST_ARGS)
 
 test-oldest: ## run the test suite with the oldest admitted version of every dependency
 	@.ci/setup oldest
 	@.ci/setup ngspice
+	@.ci/setup gnucap
 	$(PY) -m pytest $(PYTEST_ARGS)
 
 lint: style types ## style, format and types
@@ -46,6 +47,9 @@ docs: $(VENV)/.ready-docs ## build the documentation into docs/_build, warnings 
 
 ngspice: ## install ngspice where it is missing
 	@.ci/setup ngspice
+
+gnucap: ## install gnucap where it is missing: a second simulator for the tests
+	@.ci/setup gnucap
 
 clean: ## remove the environment, caches and built documentation, but no results
 	rm -rf $(VENV) build dist *.egg-info docs/_build .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,56 @@
+"""A made-up study as a library, and a reader of its files that knows nothing of what wrote them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from synthetic_study import synthetic_study
+
+from circuittex.base.arrays import Floats
+from circuittex.results.records import Study
+from circuittex.study.plan import plan
+
+CARD = re.compile(r"^\.subckt (\S+) (.*)$", re.MULTILINE)
+
+
+def study(states: int = 4) -> Study:
+    """States with contacts that have nothing to do with one another: resistances that rise and fall."""
+    made = synthetic_study(states, contacts=120, rows=(1, 1), loadings=("stretch", "shear"))
+    steps = plan(made.design)
+    records = [replace(record, name=step.name) for step, record in zip(steps, made.records, strict=True)]
+    return replace(made, records=tuple(records))
+
+
+def pins_of(text: str) -> list[str]:
+    """Nodes of a file's `.subckt` card."""
+    (card,) = CARD.findall(text)
+    return [word for word in card[1].split() if "=" not in word and not word.endswith(":")]
+
+
+def resistor_matrix(text: str) -> tuple[list[str], Floats]:
+    """Pins of a file and the nodal matrix G of its resistors reduced to them, by plain elimination."""
+    pins = pins_of(text)
+    cards = [line.split() for line in text.splitlines() if line.startswith("R")]
+    nodes = list(dict.fromkeys([*pins, *(node for card in cards for node in card[1:3])]))
+    G = np.zeros((len(nodes), len(nodes)))
+    for _, a, b, ohm in cards:
+        i, j, g = nodes.index(a), nodes.index(b), 1.0 / float(ohm)
+        G[[i, j], [i, j]] += g
+        G[[i, j], [j, i]] -= g
+    n = len(pins)
+    inner = G[n:, n:]
+    return pins, G[:n, :n] - G[:n, n:] @ np.linalg.solve(inner, G[n:, :n]) if len(inner) else G
+
+
+def ohmmeter(library: Path, name: str, pairs: list[tuple[str, str]], given: str = "", extra: str = "") -> list[str]:
+    """Decks that send 1 A through a sub-circuit from one pin to the other: V1 is the resistance."""
+    text = (library / f"{name}.lib").read_text("ascii")
+    decks = []
+    for a, b in pairs:
+        nodes = " ".join({a: "in", b: "0"}.get(pin, pin) for pin in pins_of(text))
+        lines = [f"* {name}", f".include {library / name}.lib", f"X1 {nodes} {name} {given}", "I1 0 in 1", extra]
+        decks.append("\n".join([line for line in lines if line] + [".op", ".end"]) + "\n")
+    return decks

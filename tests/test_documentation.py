@@ -243,6 +243,17 @@ def test_the_sub_circuit_runs_beside_the_delivered_netlists(computed: Path) -> N
     assert current(REDUCED, computed / "netlists") == pytest.approx(found, rel=0.01)
 
 
+def test_the_sensor_of_the_library_page_runs(folder: Path) -> None:
+    """Beside the library that the page exports: strained by at most 1 %, which was computed, no flag is up."""
+    (text,) = [inner for name, inner in shown("spice") if name == "library.md"]
+    assert main(["export", "results/plain_weave", "--out", "fabric_lib"]) == ExitCode.DONE
+    plot = run_deck(text.replace("fabric_lib/", f"{folder}/fabric_lib/")).plots[-1]
+    strain, sense, flag = plot.voltage(["strain", "sense", "flag"]).T
+    assert strain.max() == pytest.approx(0.01, rel=1e-3)
+    assert (np.abs(flag) < 1e-9).all()
+    assert ((sense > 0.0) & (sense < 3.3)).all()
+
+
 def test_a_deck_runs_as_it_stands(computed: Path, tmp_path: Path) -> None:
     shutil.copy(computed / "netlists" / "relaxed_straight.cir", tmp_path / "deck.cir")
     (command,) = re.findall(r"`(ngspice [^`]*)`", (ROOT / "docs" / "netlist.md").read_text("utf-8"))

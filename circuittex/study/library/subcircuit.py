@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from circuittex.base.arrays import Ints
 from circuittex.base.version import __version__
 from circuittex.study.library.cell import Cell
 from circuittex.study.library.dialect import DIALECTS, Dialect
@@ -57,11 +58,14 @@ def _fixed(network: Network) -> list[str]:
 
 def _by_parameter(network: Network, dialect: Dialect) -> list[str]:
     """Resistors whose values follow the parameter, and a source for the flag."""
-    found = pieces(network.strain, network.conductance)
+    found, log = _logarithms(network)
     lines = [f".param {USED}={{{_clamped(STRAIN, found)}}}"]
     lines += [
-        f"R{name} {a} {b} {{exp(-{_log_conductance(found, k, USED, dialect)})}}"
-        for k, (name, (a, b)) in enumerate(zip(network.names, network.nodes, strict=True))
+        f".param {_log(k)}={{{_log_conductance(found, k, USED, dialect)}}}" for k in range(found.coefficients.shape[2])
+    ]
+    lines += [
+        f"R{name} {a} {b} {{exp(-{_log(k)})}}"
+        for name, (a, b), k in zip(network.names, network.nodes, log.tolist(), strict=True)
     ]
     return [*lines, f"V{FLAG} {FLAG} 0 {{{_outside(STRAIN, found, dialect)}}}"]
 
@@ -73,18 +77,32 @@ def _by_pin(network: Network, dialect: Dialect) -> list[str]:
     makes a transient three times as fast. It is held between those of the samples also where a simulator tries on
     its way what is no solution, so that the conductance is positive and finite always.
     """
-    found = pieces(network.strain, network.conductance)
-    lines = [f"R{STRAIN} {STRAIN} 0 {OPEN!r}"]
-    lines.append(f"B{USED} {USED} 0 V={dialect.expression.format(of=_clamped(f'V({STRAIN})', found))}")
-    for k, (name, (a, b)) in enumerate(zip(network.names, network.nodes, strict=True)):
-        log = f"log_{k + 1}"
-        low, high = found.bounds[:, k].tolist()
-        of = _log_conductance(found, k, f"V({USED})", dialect)
-        lines.append(f"B{log} {log} 0 V={dialect.expression.format(of=of)}")
-        of = f"V({a},{b})*exp(min(max(V({log}),{low!r}),{high!r}))"
-        lines.append(f"B{name} {a} {b} I={dialect.expression.format(of=of)}")
-    of = _outside(f"V({STRAIN})", found, dialect)
-    return [*lines, f"B{FLAG} {FLAG} 0 V={dialect.expression.format(of=of)}"]
+    found, log = _logarithms(network)
+
+    def source(name: str, plus: str, minus: str, quantity: str, of: str) -> str:
+        return f"B{name} {plus} {minus} {quantity}={dialect.expression.format(of=of)}"
+
+    lines = [f"R{STRAIN} {STRAIN} 0 {OPEN!r}", source(USED, USED, "0", "V", _clamped(f"V({STRAIN})", found))]
+    lines += [
+        source(_log(k), _log(k), "0", "V", _log_conductance(found, k, f"V({USED})", dialect))
+        for k in range(found.coefficients.shape[2])
+    ]
+    bounds = found.bounds.T.tolist()
+    for name, (a, b), k in zip(network.names, network.nodes, log.tolist(), strict=True):
+        low, high = bounds[k]
+        lines.append(source(name, a, b, "I", f"V({a},{b})*exp(min(max(V({_log(k)}),{low!r}),{high!r}))"))
+    return [*lines, source(FLAG, FLAG, "0", "V", _outside(f"V({STRAIN})", found, dialect))]
+
+
+def _logarithms(network: Network) -> tuple[Pieces, Ints]:
+    """The pieces of those conductances that differ, and for each resistor (R,) which of them is its own."""
+    different, log = np.unique(network.conductance, axis=1, return_inverse=True)
+    return pieces(network.strain, different), log.ravel()
+
+
+def _log(number: int) -> str:
+    """Name of the logarithm of a conductance."""
+    return f"log_{number + 1}"
 
 
 def _clamped(strain: str, found: Pieces) -> str:
@@ -118,8 +136,3 @@ def _cubic(strain: str, start: float, coefficients: Sequence[float]) -> str:
     t = strain if start == 0.0 else f"({strain}-({start!r}))"
     c0, c1, c2, c3 = coefficients
     return f"({c0!r})+{t}*(({c1!r})+{t}*(({c2!r})+{t}*({c3!r})))"
-
-
-def counted(network: Network) -> str:
-    """How large a network is, in words."""
-    return f"{len(network.names)} resistors, {len(np.unique(network.nodes))} nodes"

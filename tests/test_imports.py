@@ -69,7 +69,7 @@ LIBRARIES: dict[str, set[str]] = {
     "numba": {"base"},
     "pypardiso": {"mech"},
     "threadpoolctl": {"solvers"},
-    "networkx": {"electrical.network"},
+    "networkx": {"electrical.network", "study.library"},
     "PySpice": {"electrical.spice"},
     "h5py": {"results.store"},
     "jinja2": {"results.report"},

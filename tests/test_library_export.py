@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from library_cases import study
+from library_cases import CARD, study
 
 from circuittex.base.errors import CircuitError, CircuittexWarning, DesignError
 from circuittex.command.cli import main
@@ -18,10 +18,14 @@ from circuittex.command.exit_codes import ExitCode
 from circuittex.electrical.network.ports import PortMatrix, resistances
 from circuittex.results.store import write_study_start
 from circuittex.study.library.accuracy import pair_errors
+from circuittex.study.library.cell import Cell, Pin
 from circuittex.study.library.export import export_library
 from circuittex.study.library.interpolation import pieces, value, without
+from circuittex.study.library.network import Network, floating, ports_network
+from circuittex.study.library.parts import pins
 from circuittex.study.library.path import branches
 from circuittex.study.library.rating import rated_currents
+from circuittex.study.library.subcircuit import library_text
 from circuittex.study.library.thinning import thinned
 
 
@@ -74,6 +78,33 @@ def test_free_ends_have_the_terminals_as_pins(tmp_path: Path) -> None:
     names = {cell.name: [pin.name for pin in cell.pins] for cell in cells}
     assert names["fabric_free_ports"] == [terminal.name for terminal in study(2).design.terminals]
     assert {"fabric_free_detailed", "fabric_free_ports_stretch_v"} <= set(names)
+
+
+def test_no_two_nodes_or_devices_share_a_name() -> None:
+    """Terminals called like what drives strain, like the inside of a cell, or so that their pairs look alike."""
+    names = ["strain", "Out of range", "strain_used", "log_1", "a", "b_c", "a_b", "c", "log", "1"]
+    matrix = PortMatrix(tuple(names), 10.0 * np.eye(10) - np.ones((10, 10)))
+    other = replace(matrix, conductance=matrix.conductance * np.linspace(1, 2, 10) * np.linspace(1, 2, 10)[:, None])
+    network = ports_network([matrix, other], np.array([0.0, 0.1]))
+    made = study(1).design
+    electrical = pins(made, network)
+    control = (Pin("strain", "bottom", "control"), Pin("out_of_range", "bottom", "flag"))
+    cell = Cell("x", "ports", "", (*electrical, *control), (), "ngspice/x.lib", "ngspice")
+    text = library_text(cell, network, [])
+    (card,) = CARD.findall(text)
+    words = card[1].split()
+    assert len(set(words)) == len(words) == 12
+    cards = [line.split()[:3] for line in text.splitlines() if line[0] in "BR"]
+    assert len({name for name, *_ in cards}) == len(cards) > 90
+    inner = {plus for name, plus, minus in cards if minus == "0"} - {"strain", "out_of_range"}
+    assert not inner & set(words)
+    assert len(inner) == np.unique(network.conductance, axis=1).shape[1] + 1
+
+
+def test_parts_that_float_are_found() -> None:
+    ends = (("a", "x"), ("x", "b"), ("d", "c"))
+    network = Network(("a", "b", "c", "d", "e"), ("1", "2", "3"), ends, np.zeros(1), np.ones((1, 3)))
+    assert floating(network) == ("c", "e")
 
 
 def test_command_line_and_datasheet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

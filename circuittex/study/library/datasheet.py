@@ -26,6 +26,7 @@ CAPTIONS = {
 }
 MISSING = {
     "Corners and Monte Carlo": "not available: the library is made of one study, not of an ensemble",
+    "Two loadings at once": "not available: a part for each, since the states under both at once were not computed",
     "Temperature coefficient": "not available: the conductivities of the design do not depend on temperature",
     "Capacitance, inductance": "not available: the model has no answer",
     "Power rating": "the rated current squared times the resistance of the probe",

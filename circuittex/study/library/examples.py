@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from circuittex.design import Design, Probe
 from circuittex.electrical.network.circuit import Circuit, yarn_end_name
 from circuittex.netlist import Header, deck
@@ -13,34 +15,39 @@ SINE = {"ltspice": "SINE"}
 """How the source is called where it is not SIN."""
 
 
-def example_deck(cell: Cell, low: float, high: float) -> str:
+def example_deck(cell: Cell, low: float, high: float, floating: Sequence[str] = ()) -> str:
     """A deck that measures between the first two pins, to stand in a folder beside that of the cell's file.
 
     `low` and `high` are the smallest and largest sampled strain; they do not matter where strain is no input.
+    `floating` pins, of parts that nothing joins to the second pin, have a large resistor to ground.
     """
     if cell.parameters:
-        return _parameter(cell, low, high)
-    return _pin(cell, low, high) if any(pin.kind == "control" for pin in cell.pins) else _resistance(cell)
+        return _parameter(cell, low, high, floating)
+    pin = any(pin.kind == "control" for pin in cell.pins)
+    return _pin(cell, low, high, floating) if pin else _resistance(cell, floating)
 
 
-def _resistance(cell: Cell) -> str:
+def _resistance(cell: Cell, floating: Sequence[str]) -> str:
     # A sweep of one point: gnucap and LTspice print and measure nothing of an operating point.
-    return _deck(cell, OHMMETER, ["V1 in 0 1", _call(cell), ".print dc v(in) i(V1)", ".dc V1 1 1 1"])
+    lines = ["V1 in 0 1", _call(cell), *_grounded(cell, floating), ".print dc v(in) i(V1)", ".dc V1 1 1 1"]
+    return _deck(cell, OHMMETER, lines)
 
 
-def _parameter(cell: Cell, low: float, high: float) -> str:
+def _parameter(cell: Cell, low: float, high: float, floating: Sequence[str]) -> str:
     what = f"{OHMMETER}; at the lowest strain, amid the range, and beyond it, where the flag is up"
     lines = []
     for number, strain in enumerate((low, (low + high) / 2, 2 * high - low), 1):
         given = f" {DIALECTS[cell.dialect].parameters}strain={strain!r}"
         lines += [f"V{number} in_{number} 0 1", _call(cell, f"_{number}") + given]
+        lines += _grounded(cell, floating, f"_{number}")
     show = "i(V1) i(V2) i(V3) v(out_of_range_1) v(out_of_range_3)"
     return _deck(cell, what, [*lines, f".print dc {show}", ".dc V1 1 1 1"])
 
 
-def _pin(cell: Cell, low: float, high: float) -> str:
+def _pin(cell: Cell, low: float, high: float, floating: Sequence[str]) -> str:
     sine = f"{SINE.get(cell.dialect, 'SIN')}({(low + high) / 2!r} {(high - low) / 2!r} 100 0 0 -90)"
-    lines = ["V1 in 0 1", f"Vstrain strain 0 {sine}", _call(cell), ".print tran v(strain) i(V1) v(out_of_range)"]
+    lines = ["V1 in 0 1", f"Vstrain strain 0 {sine}", _call(cell), *_grounded(cell, floating)]
+    lines.append(".print tran v(strain) i(V1) v(out_of_range)")
     if cell.dialect != "xyce":
         lines.append(".meas tran i_stretched FIND i(V1) AT=5m")
     return _deck(cell, f"{OHMMETER}; strain breathes once through its range in 10 ms", [*lines, ".tran 20u 10m"])
@@ -52,9 +59,18 @@ def _deck(cell: Cell, what: str, lines: list[str]) -> str:
 
 def _call(cell: Cell, end: str = "") -> str:
     """The card of an instance; its nodes are called like the pins, the first one 'in', the second is ground."""
+    return f"X1{end} {' '.join(_node(cell, pin.name, end) for pin in cell.pins)} {cell.name}"
+
+
+def _node(cell: Cell, pin: str, end: str) -> str:
+    """The node of a deck at a pin."""
     first, second = [pin.name for pin in cell.pins if pin.kind == "electrical"][:2]
-    nodes = ["0" if pin.name == second else f"{'in' if pin.name == first else pin.name}{end}" for pin in cell.pins]
-    return f"X1{end} {' '.join(nodes)} {cell.name}"
+    return {first: f"in{end}", second: "0"}.get(pin, f"{pin}{end}")
+
+
+def _grounded(cell: Cell, floating: Sequence[str], end: str = "") -> list[str]:
+    """Resistors that keep what floats near ground."""
+    return [f"R{pin}{end} {_node(cell, pin, end)} 0 1e9" for pin in floating]
 
 
 def crimped_probe(design: Design, circuit: Circuit, probe: Probe, state: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path as File
 
@@ -16,11 +16,13 @@ from circuittex.base.version import __version__
 from circuittex.electrical.network.names import safe_name
 from circuittex.results.records import Study
 from circuittex.study.export import probe_netlist, simplified
+from circuittex.study.library.accuracy import Errors
 from circuittex.study.library.cell import DIALECTS, Cell
 from circuittex.study.library.datasheet import write_datasheet
 from circuittex.study.library.examples import crimped_probe, example_deck
 from circuittex.study.library.facts import Facts, facts_of
 from circuittex.study.library.levels import CRIMPED, ENDS, FREE, detailed
+from circuittex.study.library.network import Network, floating
 from circuittex.study.library.parts import Part, fixed_parts, strained_parts, thin_part
 from circuittex.study.library.subcircuit import library_text
 from circuittex.study.plan import plan
@@ -60,8 +62,7 @@ def export_library(
         for part in found
         if dialect != "gnucap" or not part.path
     ]
-    ranges = {part.name: (float(part.network.strain[0]), float(part.network.strain[-1])) for part in found}
-    _write_examples(folder / "examples", cells, ranges)
+    _write_examples(folder / "examples", cells, {part.name: part.network for part in found})
     _write_probes(folder / "examples", study, chosen)
     write_datasheet(folder, study, known, cells)
     library = {
@@ -72,11 +73,18 @@ def export_library(
         "state": study.records[chosen].name,
         "ends": ends,
         "recommended": known.recommended,
-        "errors": {level: {"worst": each.worst, "median": each.median} for level, each in known.errors.items()},
+        "errors": {level: _plain(each) for level, each in known.errors.items()},
+        "interpolation_errors": {word: _plain(each) for word, each in known.left_out.items()},
         "cells": [asdict(cell) for cell in cells],
     }
     write_text(folder / "library.json", json.dumps(library, indent=1) + "\n", encoding="ascii")
     return tuple(cells)
+
+
+def _plain(errors: Errors) -> dict[str, list[float | None]]:
+    """Errors in resistance and in change for JSON, which has no nan."""
+    parts = {"worst": errors.worst, "median": errors.median}
+    return {name: [None if np.isnan(each) else each for each in pair] for name, pair in parts.items()}
 
 
 def _checked(study: Study, state: str, ends: str, thin: float, dialects: Sequence[str], rise: float) -> int:
@@ -127,11 +135,13 @@ def _write(folder: File, study: Study, known: Facts, part: Part, dialect: str, c
     return cell
 
 
-def _write_examples(folder: File, cells: Sequence[Cell], ranges: dict[str, tuple[float, float]]) -> None:
+def _write_examples(folder: File, cells: Sequence[Cell], networks: Mapping[str, Network]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for cell in cells:
         if cell.level != "detailed":
-            _write_ascii(folder / f"{cell.dialect}_{cell.name}.cir", example_deck(cell, *ranges[cell.name]))
+            network = networks[cell.name]
+            low, high = network.strain[[0, -1]].tolist()
+            _write_ascii(folder / f"{cell.dialect}_{cell.name}.cir", example_deck(cell, low, high, floating(network)))
 
 
 def _write_probes(folder: File, study: Study, chosen: int) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import networkx as nx
 import numpy as np
 
 from circuittex.base.arrays import Floats
@@ -13,6 +14,8 @@ from circuittex.electrical.network.circuit import Circuit
 from circuittex.electrical.network.names import unique_names
 from circuittex.electrical.network.ports import PortMatrix, port_matrix
 
+STRAIN, FLAG, USED = CONTROLS = ("strain", "out_of_range", "strain_used")
+"""What drives a strained cell: the parameter or pin, the pin that flags, and the strain that is used inside."""
 FLOOR = 1e-9
 """What opens in some states of a path and not in others keeps this part of its smallest conductance: the logarithm of
 none has no value between states, and a resistor that reaches none stops a transient."""
@@ -41,12 +44,22 @@ def ports_network(matrices: Sequence[PortMatrix], strain: Floats) -> Network:
     >>> ports_network([matrix], np.zeros(1)).conductance.tolist()
     [[0.5]]
     """
-    pins = unique_names(matrices[0].ports)
+    pins = pin_words(matrices[0].ports)
     i, j = np.triu_indices(len(pins), 1)
     siemens = -np.array([matrix.conductance[i, j] for matrix in matrices])
     there = (siemens > 0.0).any(axis=0)
     ends = [(pins[a], pins[b]) for a, b in zip(i[there].tolist(), j[there].tolist(), strict=True)]
-    return Network(pins, tuple(f"{a}_{b}" for a, b in ends), tuple(ends), strain, _positive(siemens[:, there]))
+    names = unique_names(f"{a}_{b}" for a, b in ends)
+    return Network(pins, names, tuple(ends), strain, _positive(siemens[:, there]))
+
+
+def pin_words(ports: Sequence[str]) -> tuple[str, ...]:
+    """Words for ports that are none of those of strain.
+
+    >>> pin_words(["warp1_minus", "Strain"])
+    ('warp1_minus', 'strain_2')
+    """
+    return unique_names([*CONTROLS, *ports])[len(CONTROLS) :]
 
 
 def circuit_network(circuits: Sequence[Circuit], strain: Floats, pins: Sequence[str]) -> Network:
@@ -54,7 +67,7 @@ def circuit_network(circuits: Sequence[Circuit], strain: Floats, pins: Sequence[
     first = circuits[0]
     if any(each.resistor_names != first.resistor_names for each in circuits):
         raise CircuitError("the networks of the states differ in shape: they cannot be one sub-circuit")
-    words = unique_names(first.node_names)
+    words = pin_words(first.node_names)
     place = {name: words[node] for name, node in zip(first.ports, first.port_node.tolist(), strict=True)}
     ends = [(words[a], words[b]) for a, b in first.resistor_nodes.tolist()]
     return Network(
@@ -85,6 +98,18 @@ def matrix_at(network: Network, conductance: Floats) -> PortMatrix:
         unreached=np.empty(0, dtype=np.int64),
     )
     return port_matrix(circuit)
+
+
+def floating(network: Network) -> tuple[str, ...]:
+    """A pin of each part of a network that nothing joins to its second pin.
+
+    >>> floating(Network(("a", "b", "c"), ("a_b",), (("a", "b"),), np.zeros(1), np.ones((1, 1))))
+    ('c',)
+    """
+    graph = nx.Graph(network.nodes)
+    graph.add_nodes_from(network.pins)
+    parts = [part.intersection(network.pins) for part in nx.connected_components(graph)]
+    return tuple(min(part) for part in parts if part and network.pins[1] not in part)
 
 
 def _positive(siemens: Floats) -> Floats:

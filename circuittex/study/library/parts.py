@@ -12,13 +12,11 @@ from circuittex.base.errors import CircuitError, CircuittexWarning
 from circuittex.base.frozen import frozen
 from circuittex.design import Design
 from circuittex.electrical.network.circuit import Circuit, yarn_end_name
-from circuittex.electrical.network.names import unique_names
 from circuittex.electrical.network.ports import PortMatrix
 from circuittex.study.library.cell import Pin
 from circuittex.study.library.levels import Levels
-from circuittex.study.library.network import Network, circuit_network, ports_network
+from circuittex.study.library.network import FLAG, STRAIN, Network, circuit_network, pin_words, ports_network
 from circuittex.study.library.path import Path
-from circuittex.study.library.subcircuit import FLAG, STRAIN
 
 PARAMETER, PIN = "_s", "_v"
 """How names of cells end whose strain is a parameter, and a pin."""
@@ -123,6 +121,6 @@ def pins(design: Design, network: Network) -> tuple[Pin, ...]:
             sides[yarn_end_name(f"{kind}{k + 1}", -1)] = minus
             sides[yarn_end_name(f"{kind}{k + 1}", 1)] = plus
     ends = [yarn_end_name(*terminal.ends[0]) for terminal in design.terminals]
-    words = unique_names([terminal.name for terminal in design.terminals])
+    words = pin_words([terminal.name for terminal in design.terminals])
     free = {word: sides[end] for word, end in zip(words, ends, strict=True)}
     return tuple(Pin(name, sides.get(name, free.get(name, "left")), "electrical") for name in network.pins)

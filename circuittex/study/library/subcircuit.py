@@ -9,14 +9,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from circuittex.base.arrays import Ints
+from circuittex.base.frozen import frozen
 from circuittex.base.version import __version__
+from circuittex.electrical.network.names import unique_names
 from circuittex.study.library.cell import Cell
 from circuittex.study.library.dialect import DIALECTS, Dialect
 from circuittex.study.library.interpolation import Pieces, pieces
-from circuittex.study.library.network import Network
+from circuittex.study.library.network import CONTROLS, FLAG, STRAIN, USED, Network
 
-STRAIN, FLAG, USED = "strain", "out_of_range", "strain_used"
-"""Names of what drives a strained cell: the parameter or pin, the pin that flags, and what is used inside."""
 SLACK = 1e-6
 """A strain this part of the range beyond its ends is at the end: a source's rounding raises no flag."""
 OPEN = 1e9
@@ -56,18 +56,40 @@ def _fixed(network: Network) -> list[str]:
     return [f"R{name} {a} {b} {value!r}" for name, (a, b), value in zip(network.names, network.nodes, ohm, strict=True)]
 
 
+@frozen
+class _Strained:
+    """A network whose resistors follow a strain: those of one conductance share its logarithm."""
+
+    pieces: Pieces
+    """Of the L conductances that differ."""
+    logs: tuple[str, ...]
+    """(L,) words for their logarithms, which no node has."""
+    own: Ints
+    """(R,) which of them is that of each resistor."""
+    devices: tuple[str, ...]
+    """(R,) names of the resistors that no other device has."""
+
+
+def _strained(network: Network) -> _Strained:
+    different, own = np.unique(network.conductance, axis=1, return_inverse=True)
+    nodes = dict.fromkeys([*CONTROLS, *network.pins, *(node for ends in network.nodes for node in ends)])
+    logs = unique_names([*nodes, *(f"log_{k + 1}" for k in range(different.shape[1]))])[len(nodes) :]
+    devices = unique_names([*CONTROLS, *logs, *network.names])[len(CONTROLS) + len(logs) :]
+    return _Strained(pieces(network.strain, different), logs, own.ravel(), devices)
+
+
 def _by_parameter(network: Network, dialect: Dialect) -> list[str]:
     """Resistors whose values follow the parameter, and a source for the flag."""
-    found, log = _logarithms(network)
-    lines = [f".param {USED}={{{_clamped(STRAIN, found)}}}"]
+    known = _strained(network)
+    lines = [f".param {USED}={{{_clamped(STRAIN, known.pieces)}}}"]
     lines += [
-        f".param {_log(k)}={{{_log_conductance(found, k, USED, dialect)}}}" for k in range(found.coefficients.shape[2])
+        f".param {log}={{{_log_conductance(known.pieces, k, USED, dialect)}}}" for k, log in enumerate(known.logs)
     ]
     lines += [
-        f"R{name} {a} {b} {{exp(-{_log(k)})}}"
-        for name, (a, b), k in zip(network.names, network.nodes, log.tolist(), strict=True)
+        f"R{name} {a} {b} {{exp(-{known.logs[k]})}}"
+        for name, (a, b), k in zip(known.devices, network.nodes, known.own.tolist(), strict=True)
     ]
-    return [*lines, f"V{FLAG} {FLAG} 0 {{{_outside(STRAIN, found, dialect)}}}"]
+    return [*lines, f"V{FLAG} {FLAG} 0 {{{_outside(STRAIN, known.pieces, dialect)}}}"]
 
 
 def _by_pin(network: Network, dialect: Dialect) -> list[str]:
@@ -77,32 +99,21 @@ def _by_pin(network: Network, dialect: Dialect) -> list[str]:
     makes a transient three times as fast. It is held between those of the samples also where a simulator tries on
     its way what is no solution, so that the conductance is positive and finite always.
     """
-    found, log = _logarithms(network)
+    known = _strained(network)
 
     def source(name: str, plus: str, minus: str, quantity: str, of: str) -> str:
         return f"B{name} {plus} {minus} {quantity}={dialect.expression.format(of=of)}"
 
-    lines = [f"R{STRAIN} {STRAIN} 0 {OPEN!r}", source(USED, USED, "0", "V", _clamped(f"V({STRAIN})", found))]
+    lines = [f"R{STRAIN} {STRAIN} 0 {OPEN!r}", source(USED, USED, "0", "V", _clamped(f"V({STRAIN})", known.pieces))]
     lines += [
-        source(_log(k), _log(k), "0", "V", _log_conductance(found, k, f"V({USED})", dialect))
-        for k in range(found.coefficients.shape[2])
+        source(log, log, "0", "V", _log_conductance(known.pieces, k, f"V({USED})", dialect))
+        for k, log in enumerate(known.logs)
     ]
-    bounds = found.bounds.T.tolist()
-    for name, (a, b), k in zip(network.names, network.nodes, log.tolist(), strict=True):
+    bounds = known.pieces.bounds.T.tolist()
+    for name, (a, b), k in zip(known.devices, network.nodes, known.own.tolist(), strict=True):
         low, high = bounds[k]
-        lines.append(source(name, a, b, "I", f"V({a},{b})*exp(min(max(V({_log(k)}),{low!r}),{high!r}))"))
-    return [*lines, source(FLAG, FLAG, "0", "V", _outside(f"V({STRAIN})", found, dialect))]
-
-
-def _logarithms(network: Network) -> tuple[Pieces, Ints]:
-    """The pieces of those conductances that differ, and for each resistor (R,) which of them is its own."""
-    different, log = np.unique(network.conductance, axis=1, return_inverse=True)
-    return pieces(network.strain, different), log.ravel()
-
-
-def _log(number: int) -> str:
-    """Name of the logarithm of a conductance."""
-    return f"log_{number + 1}"
+        lines.append(source(name, a, b, "I", f"V({a},{b})*exp(min(max(V({known.logs[k]}),{low!r}),{high!r}))"))
+    return [*lines, source(FLAG, FLAG, "0", "V", _outside(f"V({STRAIN})", known.pieces, dialect))]
 
 
 def _clamped(strain: str, found: Pieces) -> str:

@@ -77,7 +77,10 @@ class Fit:
 
     @property
     def crossings_by_name(self) -> dict[str, float]:
-        """Rc of each pair of kinds that cross, ohm: by the name 'Rc', or where there are several by theirs."""
+        """Rc of each pair of kinds that cross, ohm: by the name 'Rc', or where there are several by theirs; none where
+        no two yarns that conduct cross."""
+        if self.kinds and not self.pairs:
+            return {}
         return dict(zip(_named("Rc", self.pairs), _values(self.pair_resistance, self.Rc), strict=True))
 
     @property
@@ -105,7 +108,8 @@ def network_names(design: Design) -> tuple[tuple[str, ...], tuple[str, ...]]:
     (('Ry',), ('Rc',))
     """
     grouping = groups(design, each_crossing=_method(design) == "all-pairs")
-    return _named("Ry", grouping.yarns), _named("Rc", tuple(_conducting_pairs(design, grouping)))
+    pairs = tuple(_conducting_pairs(design, grouping))
+    return _named("Ry", grouping.yarns), _named("Rc", pairs) if pairs or not grouping.yarns else ()
 
 
 def _named(letters: str, kinds: Sequence[str]) -> tuple[str, ...]:

@@ -77,6 +77,7 @@ def test_mixed(tmp_path: Path) -> None:
         assert record.fit.kinds == ("copper weft", "silver weft")
         assert record.fit.kind_resistance == pytest.approx([copper, silver], rel=1e-9)
         assert np.isinf(record.fit.crossings).all()
+        assert len(record.outcome.network) == 2, "no Rc where no two conductors cross"
         assert record.currents == pytest.approx([0.01 / (2 * copper), 0.01 / (2 * silver)], rel=1e-9)
 
 

@@ -1,9 +1,9 @@
 """summary.json: the numbers of a study for programs, and the table at the end of a run.
 
-The file is strict JSON; a number that is undefined (nan) or infinite is null. Keys of version 1:
+The file is strict JSON; a number that is undefined (nan) or infinite is null. Keys of version 2:
 
 ``format``
-    1. A change that would break readers of the file gives a new number; new keys do not.
+    2. A change that would break readers of the file gives a new number; new keys do not.
 ``version``, ``design``, ``design_hash``
     version of circuittex, name of the design, and the hash that also stands in the netlists
 ``parameters``

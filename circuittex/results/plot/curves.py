@@ -80,7 +80,7 @@ def network_figure(study: Study) -> Figure:
     columns = min(len(names), 2 if len(names) == 4 else MOST_COLUMNS)
     rows = -(-len(names) // columns)
     with style():
-        figure = new_figure(8.0 if columns == 2 else 10.0, 3.4 * rows)
+        figure = new_figure({1: 5.0, 2: 8.0, 3: 10.0}[columns], 3.4 * rows)
         for number, name in enumerate(names):
             axes = figure.add_subplot(rows, columns, number + 1)
             colour = COLOURS[number % len(COLOURS)]
@@ -93,6 +93,7 @@ def network_figure(study: Study) -> Figure:
             draw_error_bars(axes, _bars(study, loadings.values(), name), colour)
             if not np.isfinite([record.outcome.network[number] for record in study.records]).any():
                 axes.text(0.5, 0.5, "infinite or not determined", ha="center", va="center", transform=axes.transAxes)
+                axes.set(xticks=[], yticks=[])
             letters, _, kind = name.partition(" ")
             part = {"Ry": "yarn segment", "Rc": "crossing"}[letters]
             axes.set_title(f"{part}\n{kind}" if kind else part)

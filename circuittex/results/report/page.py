@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from circuittex.base.arrays import Floats
 from circuittex.base.atomic import write_text
 from circuittex.results.claims.table import Table, claims_table
 from circuittex.results.plot import save_figures
@@ -143,8 +145,14 @@ def _states(study: Study) -> Markup:
 
 def _forces(study: Study) -> dict[str, Any]:
     head = ["state", *(f"{side} F{axis} (N)" for side in ("warp +x", "weft +y") for axis in "xyz")]
-    rows = [[r.name, *(f"{force:.4f}" for force in r.clamp_force.ravel())] for r in study.records]
+    rows = [[r.name, *_rounded(r.clamp_force.ravel())] for r in study.records]
     return {"head": head, "rows": rows}
+
+
+def _rounded(values: Floats) -> list[str]:
+    """Numbers to five digits of the largest, whose size may be any."""
+    last = 10.0 ** (math.floor(math.log10(np.abs(values).max(initial=0.0) or 1.0)) - 4)
+    return [_number(round(value / last) * last + 0.0, 5) for value in values.tolist()]
 
 
 def _equilibrium(study: Study) -> dict[str, Any]:

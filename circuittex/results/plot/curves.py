@@ -23,6 +23,8 @@ CLAMPS = ("warp clamps, +x ends", "weft clamps, +y ends")
 ESTIMATED = ("Fx warp", "Fy weft")
 """What error estimates call the force along the yarns at these clamps."""
 MOST_COLUMNS = 3
+MOST_TICKS = 5
+"""Intervals between strains on an axis: numbers as long as 0.0005 stand apart."""
 LEAST = 0.01
 """Share of its values that an axis shows on either side at least, lest differences in the fifth digit fill it."""
 _DIAMOND: dict[str, Any] = {"linestyle": "", "marker": "D", "markersize": 7, "markerfacecolor": "none"}
@@ -167,7 +169,9 @@ def _finish(figure: Figure, study: Study, names: Sequence[str]) -> None:
     only = names or [records[-1].loading if len(loadings) == 1 else "" for records in loadings[:1] for _ in figure.axes]
     for axes, name in zip(figure.axes, only, strict=True):
         axes.set_xlabel(f"strain ({name})" if name else "strain")
-        axes.ticklabel_format(axis="y", useOffset=False)
+        if len(axes.get_xticks()):  # a panel that says why it is empty has none
+            axes.ticklabel_format(axis="y", useOffset=False)
+            axes.locator_params(axis="x", nbins=MOST_TICKS)
         if axes.get_legend_handles_labels()[1]:
             axes.legend()
     keys = []

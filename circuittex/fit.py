@@ -71,6 +71,19 @@ class Fit:
     network is not determined."""
 
     @property
+    def segments_by_name(self) -> dict[str, float]:
+        """Ry of each kind of yarn, ohm: by the name 'Ry', or where there are several by those of `network_names`."""
+        return dict(zip(_named("Ry", self.kinds), _values(self.kind_resistance, self.Ry), strict=True))
+
+    @property
+    def crossings_by_name(self) -> dict[str, float]:
+        """Rc of each pair of kinds that cross, ohm: by the name 'Rc', or where there are several by theirs; none where
+        no two yarns that conduct cross."""
+        if self.kinds and not self.pairs:
+            return {}
+        return dict(zip(_named("Rc", self.pairs), _values(self.pair_resistance, self.Rc), strict=True))
+
+    @property
     def known(self) -> bool:
         """Whether the data determine the whole network, so that it can be written down."""
         values = np.concatenate([self.yarns.ravel(), self.crossings.ravel()])
@@ -87,6 +100,34 @@ class Fit:
         return reduced_circuit((n, m), self.yarns, self.crossings)
 
 
+def network_names(design: Design) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the resistances of the reduced networks of a design: those of yarns, and those of crossings.
+
+    >>> from circuittex.design import plain_weave
+    >>> network_names(plain_weave())
+    (('Ry',), ('Rc',))
+    """
+    grouping = groups(design, each_crossing=_method(design) == "all-pairs")
+    pairs = tuple(_conducting_pairs(design, grouping))
+    return _named("Ry", grouping.yarns), _named("Rc", pairs) if pairs or not grouping.yarns else ()
+
+
+def _named(letters: str, kinds: Sequence[str]) -> tuple[str, ...]:
+    return tuple(f"{letters} {kind}" for kind in kinds) if len(kinds) > 1 else (letters,)
+
+
+def _values(by_kind: Floats, one: float) -> list[float]:
+    """Resistances by kind; the one of the network where no kind conducts, or a file of older results has none."""
+    return by_kind.tolist() if len(by_kind) else [one]
+
+
+def _method(design: Design) -> str:
+    """What the design is fitted to: 'probes' or 'all-pairs'."""
+    if design.electrical.fit != "auto":
+        return design.electrical.fit
+    return "probes" if len(groups(design, each_crossing=False).yarns) == 1 else "all-pairs"
+
+
 def fit_network(
     currents: Sequence[float] | Floats, design: Design, matrix: PortMatrix | None = None, *, weighting: str = "relative"
 ) -> Fit:
@@ -101,9 +142,7 @@ def fit_network(
     """
     weave = design.weave
     shape = len(weave.warp), len(weave.weft)
-    method = design.electrical.fit
-    if method == "auto":
-        method = "probes" if len(groups(design, each_crossing=False).yarns) == 1 else "all-pairs"
+    method = _method(design)
     grouping = groups(design, each_crossing=method == "all-pairs")
     currents = np.asarray(currents, dtype=np.float64)
     told = np.isfinite(currents)
@@ -131,9 +170,8 @@ def fit_network(
     if one is None:
         assert match is not None
         one = _of_match(design, match, values, k, best)
-    kinds, q = _kind_pairs(design), grouping.crossing_group
-    per_pair = {name: crossings[where] for name, where in kinds.items() if (q[where] >= 0).any()}
-    warnings, one_rc = one.warnings, method == "probes" and q.size > 1
+    per_pair = {name: crossings[where] for name, where in _conducting_pairs(design, grouping).items()}
+    warnings, one_rc = one.warnings, method == "probes" and crossings.size > 1
     if errors[0] > POOR:
         way_out = '; with electrical.fit = "all-pairs" each crossing has a resistance of its own' if one_rc else ""
         warnings += (f"the reduced network is off by up to {100 * errors[0]:.2g} % between two yarn ends{way_out}",)
@@ -214,13 +252,14 @@ def _conducts(yarn: Yarn) -> bool:
     return any(material.electrical_conductivity > 0.0 for material in yarn.materials)
 
 
-def _kind_pairs(design: Design) -> dict[str, tuple[Ints, Ints]]:
-    """Pair of kinds -> the crossings (warp, weft) of it."""
+def _conducting_pairs(design: Design, grouping: Groups) -> dict[str, tuple[Ints, Ints]]:
+    """Pair of kinds that conduct -> the crossings (warp, weft) of it."""
     found: dict[str, list[tuple[int, int]]] = {}
     for i, warp in enumerate(design.weave.warp):
         for j, weft in enumerate(design.weave.weft):
             found.setdefault(" x ".join(sorted([warp.name, weft.name])), []).append((i, j))
-    return {name: (np.array(each)[:, 0], np.array(each)[:, 1]) for name, each in found.items()}
+    places = {name: (np.array(each)[:, 0], np.array(each)[:, 1]) for name, each in found.items()}
+    return {name: where for name, where in places.items() if (grouping.crossing_group[where] >= 0).any()}
 
 
 def fit_one_pair(currents: Sequence[float] | Floats, design: Design, *, weighting: str = "relative") -> Fit:

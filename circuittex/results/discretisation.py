@@ -82,12 +82,13 @@ class ErrorEstimate:
     """(3,) largest distance of a node from where the state has it, mm, in the repeated equilibrium on the coarse
     mesh, on the fine one, and with more contact points; nan where there is none."""
     quantities: tuple[QuantityError, ...]
-    """Clamp forces, probe currents, Ry and Rc."""
+    """Clamp forces, probe currents, Ry and Rc; where there are several kinds, of each."""
     warnings: tuple[str, ...]
     """What limits the estimate; empty if all is well."""
 
     def quantity(self, name: str) -> QuantityError:
-        """The quantity of that name: 'Fx warp', 'Fy weft', 'I ' with the name of a probe, 'Ry' or 'Rc'."""
+        """The quantity of that name: 'Fx warp', 'Fy weft', 'I ' with the name of a probe, 'Ry' or 'Rc', with the kind
+        behind it where there are several."""
         return {quantity.name: quantity for quantity in self.quantities}[name]
 
 

@@ -20,7 +20,7 @@ from circuittex.mech.configuration import Configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.relaxation.increment import Increment, advance
 from circuittex.relaxation.relax import Equilibrium, clamp_force, relax
-from circuittex.results.outcome import Outcome
+from circuittex.results.outcome import Outcome, outcome
 from circuittex.results.records import Record, Study
 from circuittex.study.export import detailed_file, simplified
 from circuittex.study.plan import Step
@@ -155,7 +155,7 @@ def outcome_of(design: Design, mesh: FibrilMesh, equilibrium: Equilibrium) -> Ou
     currents = tuple(float(field.currents[0]) for field in fields)
     merged = simplified(design, contacts).contacts
     fit = fit_network(currents, design, port_matrix(build_circuit(merged, conducting_ends(mesh))))
-    return Outcome(clamp_force(mesh, equilibrium.reaction), currents, fit.Ry, fit.Rc, equilibrium.energy)
+    return outcome(clamp_force(mesh, equilibrium.reaction), currents, fit, equilibrium.energy)
 
 
 def centre_crossing(design: Design) -> tuple[int, float]:

@@ -21,12 +21,18 @@ def parameters(design: Design) -> Markup:
     parts = [
         _weave(design.weave),
         *(
-            _settings(f"Yarn {yarn.name}", yarn, {"materials": runs(m.name for m in yarn.materials)}, skip=("name",))
+            _settings(
+                f"Yarn {yarn.name}",
+                yarn,
+                {"materials": runs(m.name for m in yarn.materials), "rows": ", ".join(map(str, yarn.rows))},
+                skip=("name",),
+            )
             for yarn in yarns
         ),
         *(_settings(f"Material {material.name}", material, skip=("name",)) for material in materials),
         *([] if design.packing.regular else [_settings("Random packing", design.packing)]),
-        _settings("Contact", design.contact),
+        _settings("Contact", design.contact, skip=("pairs",)),
+        *(_settings(f"Contact {' - '.join(p.materials)}", p, skip=("materials",)) for p in design.contact.pairs),
         _settings("Electrical", design.electrical),
         _settings("Numerics", design.numerics),
         _loading(design),

@@ -12,8 +12,9 @@ from circuittex.design import Design, Terminal
 from circuittex.electrical.fields import Fields, solve_probes
 from circuittex.electrical.network.circuit import Circuit, build_circuit, yarn_end_terminals
 from circuittex.electrical.network.nodal import solve_nodal
+from circuittex.electrical.network.one_pair import yarn_conductance
 from circuittex.electrical.network.ports import port_matrix
-from circuittex.fit import fit_network, yarn_conductance
+from circuittex.fit import fit_network
 from circuittex.geometry.levels import levels
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration

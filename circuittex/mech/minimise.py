@@ -48,6 +48,10 @@ FIRST_ESCAPE = 1e-4
 """First step away from a saddle: largest change of an unknown, in its unit."""
 ROUND_OFF = 1e-13
 """Relative change of the potential that is round-off of its sum rather than an increase."""
+UNSEEN = 100 * ROUND_OFF
+"""A step that promises less than this part of the potential cannot be judged by it. The shift is FIRST_SHIFT then,
+still a hundred times softer than the softest bending mode: with less, the round-off of its forces would turn a fibril
+that nothing holds, and to second order stretch it."""
 ROUNDED = 16 * float(np.finfo(float).eps)
 """Part of stiffness times coordinate that is round-off of a force: where nothing else acts, as little is none."""
 ARMIJO = 1e-4
@@ -213,8 +217,9 @@ def minimise(
                 continue
         force = np.where(free, gradient, 0.0)
         direction = solve(-force)
+        slope = float(force @ direction)
         try:
-            step = _search(system, q, direction, energy, float(force @ direction))
+            step = _search(system, q, direction, energy, slope)
         except PenetrationError as error:
             raise PenetrationError(str(error), np.array(history)) from error
         if step == 0.0:
@@ -224,6 +229,8 @@ def minimise(
             continue
         q = q + step * direction
         shift = max(LEAST_SHIFT, shift / 4) if step == 1.0 else (shift if step >= 0.25 else 4 * shift)
+        if -slope < UNSEEN * abs(energy):
+            shift = max(shift, FIRST_SHIFT)
     trouble = "the forces balance, but the tangent is not positive definite: a saddle, not a minimum"
     if not balanced:
         worst = int(np.argmax(left - limits))

@@ -32,6 +32,10 @@ class ConvergenceError(CircuittexError, RuntimeError):
         super().__init__(message)
 
 
+class CreepingError(ConvergenceError):
+    """A descent whose steps are so short that it would hardly arrive; whoever asked for it has another way."""
+
+
 class PenetrationError(ConvergenceError):
     """Fibrils that contact does not keep apart: through one another, or too deep for its law to mean anything."""
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import compiled
-from circuittex.base.errors import ConvergenceError, PenetrationError
+from circuittex.base.errors import ConvergenceError, CreepingError, PenetrationError
 from circuittex.base.frozen import frozen
 from circuittex.mech.linear import LinearSolver, Solve
 from circuittex.mech.pattern import DOFS, Pattern, build_pattern, diagonal, multiply
@@ -54,6 +54,8 @@ still a hundred times softer than the softest bending mode: with less, the round
 that nothing holds, and to second order stretch it."""
 ROUNDED = 16 * float(np.finfo(float).eps)
 """Part of stiffness times coordinate that is round-off of a force: where nothing else acts, as little is none."""
+SHORT, CREEPING = 1 / 32, 3
+"""A descent creeps once it has taken as many steps as short as that. In the paper's cell no step is below 1/8."""
 ARMIJO = 1e-4
 """A step must achieve this part of the decrease that the slope promises (Nocedal & Wright, 3.1)."""
 
@@ -167,6 +169,7 @@ def minimise(
     tolerance: float = 2e-5,
     force_tolerance: float = 0.0,
     max_iterations: int = 200,
+    may_creep: bool = True,
     report: Callable[[int, float], None] | None = None,
 ) -> Minimum:
     """The minimum of the terms' total potential that a descent from q (n_dofs,) reaches.
@@ -179,8 +182,8 @@ def minimise(
     other is 0.
 
     Raises `ConvergenceError`, with the history, where that is not met at a minimum in `max_iterations`: an
-    unconverged state is never returned. `PenetrationError` where a term
-    cannot keep apart what it should.
+    unconverged state is never returned. `CreepingError` where its steps are short and it may not creep,
+    `PenetrationError` where a term cannot keep apart what it should.
     """
     system = System(terms, scales, fixed, len(q))
     if before is not None:
@@ -206,6 +209,8 @@ def minimise(
             return Minimum(q, gradient, energy, residual, solves, np.array(history))
         if iteration == max_iterations:
             break
+        if not may_creep and sum(row[3] <= SHORT for row in history) >= CREEPING:
+            raise CreepingError("the steps have become short", np.array(history))
         rough = residual > ROUGH * largest
         parts = SOFTENING[part if refused or part == 0 else part - 1 :] if rough else SOFTENING[:1]
         shift, part, solve = _positive(system, solver, shift, parts, history)

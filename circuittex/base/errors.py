@@ -33,7 +33,14 @@ class ConvergenceError(CircuittexError, RuntimeError):
 
 
 class CreepingError(ConvergenceError):
-    """A descent whose steps are so short that it would hardly arrive; whoever asked for it has another way."""
+    """A descent whose steps are so short that it would hardly arrive; `q` is where it has come to."""
+
+    def __init__(self, message: str, history: Any, q: Any) -> None:
+        super().__init__(message, history)
+        self.q = q
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (str(self), self.history, self.q)
 
 
 class PenetrationError(ConvergenceError):

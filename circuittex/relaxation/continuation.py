@@ -30,15 +30,14 @@ def continued(descend: Callable[[Floats, float, bool], Minimum], q: Floats, part
 
     Raises `ConvergenceError` where the descent with `part` of the penalty does not arrive from there either.
     """
-    spent = 0
     try:
         return descend(q, part, part <= SOFTEST)
     except CreepingError as error:
-        spent += len(error.history) - 1
+        spent, reached = len(error.history) - 1, error.q
     try:
         softer = continued(descend, q, part * SOFTER)
-        q, spent = softer.q, spent + softer.iterations
-    except ConvergenceError as error:  # too soft to keep the fibrils apart: this penalty has to do
+        reached, spent = softer.q, spent + softer.iterations
+    except ConvergenceError as error:  # too soft to keep the fibrils apart: this penalty has to do, and creep on
         spent += max(0, len(error.history) - 1)
-    found = descend(q, part, True)
+    found = descend(reached, part, True)
     return replace(found, iterations=spent + found.iterations)

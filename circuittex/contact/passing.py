@@ -1,4 +1,4 @@
-"""How far a motion may go before two fibrils pass through one another: continuous collision detection of centre lines.
+"""How far a motion may go before fibrils pass through one another: continuous collision detection of centre lines.
 
 Contact sees where fibrils overlap at the end of a step and nothing of the way there. Here the centre lines are taken
 as `CHORDS` chords of each interval of the contact curve, whose points move on straight lines while q goes to
@@ -7,7 +7,8 @@ chords move against one another: with L the largest of those relative motions, d
 bound (conservative advancement: Mirtich, PhD thesis, Berkeley 1996) never leaps over a collision.
 
 Two chords *collide* when their distance falls below `COLLISION` of the one they had, or of R + R' where they started
-further apart than touch. A motion without collision is not limited at all.
+further apart than touch. A motion without collision is not limited at all. The same holds for two chords of one
+fibril, unless they are neighbours along it.
 """
 
 from __future__ import annotations
@@ -30,6 +31,9 @@ COLLISION = 1 / 4
 """Part of the first distance, or of R + R' if that is less, at which two centre lines count as having met. It leaves
 room for the line search, which goes by energies, to come back."""
 _WEIGHTS = np.einsum("kap,tp->kta", BASIS, np.linspace(0.0, 1.0, CHORDS + 1)[:, None] ** np.arange(4))
+NEIGHBOURS = np.pi
+"""Parts of R along a fibril from one of its chords to another below which they are neighbours, free to bend against one
+another: the way round a hairpin whose legs touch."""
 CLOSEST = 1 / 8
 """How close the advancement comes to the collision, in parts of it: it would never end at the place itself."""
 MOST_ADVANCES = 200
@@ -46,9 +50,10 @@ class SafeStep:
     """The part of a motion that is safe, and the pair of fibrils that limits it."""
 
     part: float
-    """From 0 to 1; 1: no two fibrils collide."""
+    """From 0 to 1; 1: nothing collides."""
     fibrils: tuple[int, int]
-    """The pair that limits it, the lower number first; meaningless where `part` is 1."""
+    """The pair that limits it, the lower number first, or twice the one that collides with itself; meaningless where
+    `part` is 1."""
     distance: float
     """The distance at the start of the chords of that pair that collide, mm."""
 
@@ -76,7 +81,9 @@ def _evaluate(weights: Any, kind: Any, window: Any, r: Any, points: Any) -> None
 
 
 def safe_step(table: CurveTable, radius: Floats, r: Floats, motion: Floats) -> SafeStep:
-    """How much of `motion` (N, 3) the nodes r (N, 3) can make before two different fibrils collide; radius (F,), mm.
+    """How much of `motion` (N, 3) the nodes r (N, 3) can make before two fibrils, or a fibril and itself, collide.
+
+    radius (F,), mm.
 
     The order of the fibrils does not matter: every pair is followed to the end.
 
@@ -100,7 +107,7 @@ def safe_step(table: CurveTable, radius: Floats, r: Floats, motion: Floats) -> S
     turned = np.roll(np.arange(3), -axis)  # the axis of the sweep first
     low, high = (np.ascontiguousarray(box[order][:, turned]) for box in (low, high))
     found = np.array([1.0, 0.0, 0.0, np.inf])
-    _sweep(order, low, high, table.fibril, radius, start, way, found)
+    _sweep(order, low, high, table.fibril, radius, start, way, _along(table.fibril, start), found)
     pair = sorted(found[1:3].astype(int).tolist())
     return SafeStep(float(found[0]), (pair[0], pair[1]), float(found[3]))
 
@@ -117,6 +124,20 @@ def likely_cause(mesh: FibrilMesh, law: ContactLaw, first: int, second: int) -> 
             'which penalty = "hertz" asks for'
         )
     return "they are pressed together further than contact can hold: load them less, or in smaller steps"
+
+
+@compiled
+def _along(fibril: Any, start: Any) -> Any:
+    """(I, CHORDS + 1) the way along each fibril from its beginning to the points between its chords."""
+    along = np.zeros(start.shape[:2])
+    for i in range(start.shape[0]):
+        if i > 0 and fibril[i] == fibril[i - 1]:
+            along[i, 0] = along[i - 1, -1]
+        for a in range(1, start.shape[1]):
+            p, q = start[i, a - 1], start[i, a]
+            length = np.sqrt((q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2 + (q[2] - p[2]) ** 2)
+            along[i, a] = along[i, a - 1] + length
+    return along
 
 
 @compiled
@@ -189,11 +210,13 @@ def _safe_part(p: Any, u: Any, q: Any, v: Any, touch: float, work: Any, first: A
 
 
 @compiled
-def _sweep(order: Any, low: Any, high: Any, fibril: Any, radius: Any, start: Any, way: Any, found: Any) -> None:
-    """The least safe part of all pairs of chords of different fibrils, with the pair and its distance, in found (4,).
+def _sweep(
+    order: Any, low: Any, high: Any, fibril: Any, radius: Any, start: Any, way: Any, along: Any, found: Any
+) -> None:
+    """The least safe part of all pairs of chords but neighbours, with the pair and its distance, in found (4,).
 
     order (I,): the intervals by the lower end along the first axis of the boxes that they sweep; these boxes low, high
-    (I, 3) stand in that order.
+    (I, 3) stand in that order; along (I, CHORDS + 1) as `_along`.
     """
     work, first = np.empty((4, 3)), np.empty(1)
     for n in range(order.shape[0]):
@@ -202,14 +225,19 @@ def _sweep(order: Any, low: Any, high: Any, fibril: Any, radius: Any, start: Any
         for m in range(n + 1, order.shape[0]):
             if low[m, 0] > ends:
                 break
-            if low[m, 1] > y or high[m, 1] < x or low[m, 2] > w or high[m, 2] < z or fibril[order[m]] == f:
+            if low[m, 1] > y or high[m, 1] < x or low[m, 2] > w or high[m, 2] < z:
                 continue
             j = order[m]
+            own, near = fibril[j] == f, NEIGHBOURS * radius[f]
+            if own and max(along[j, -1] - along[i, 0], along[i, -1] - along[j, 0]) < near:
+                continue
             touch = radius[f] + radius[fibril[j]]
             for a in range(start.shape[1] - 1):
                 for b in range(start.shape[1] - 1):
                     p, u = start[i, a : a + 2], way[i, a : a + 2]
                     q, v = start[j, b : b + 2], way[j, b : b + 2]
+                    if own and max(along[j, b] - along[i, a + 1], along[i, a] - along[j, b + 1]) < near:
+                        continue
                     if not _may_meet(p, u, q, v, COLLISION * touch):
                         continue
                     part = _safe_part(p, u, q, v, touch, work, first)

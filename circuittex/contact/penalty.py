@@ -73,11 +73,14 @@ class PenaltyContact:
     that the energy stays smooth where minima appear, merge and vanish.
 
     `law` gives P* of each pair (`pair_penalty`), `per_element` is the number of contact points of an element, `skin`
-    (mm) how far candidates reach beyond touch so that they last several iterations, by default `SKIN`.
+    (mm) how far candidates reach beyond touch so that they last several iterations, by default `SKIN`; `part` of the
+    penalty is what counts.
     """
 
-    def __init__(self, mesh: FibrilMesh, *, law: ContactLaw, per_element: int, skin: float | None = None) -> None:
-        self.mesh, self.law = mesh, law
+    def __init__(
+        self, mesh: FibrilMesh, *, law: ContactLaw, per_element: int, skin: float | None = None, part: float = 1.0
+    ) -> None:
+        self.mesh, self.law, self.part = mesh, law, part
         self.skin = SKIN * float(mesh.radius.min()) if skin is None else skin
         self.table: CurveTable = curve_table(mesh)
         self.points = contact_points(mesh, per_element)
@@ -164,7 +167,8 @@ class PenaltyContact:
     def _stiffness(self, found: Touching) -> Floats:
         """(C,) P* w of each contact point, N/mm; negative at a maximum of the distance."""
         a = self.table.fibril[found.interval_a]
-        return np.asarray(found.sign * pair_penalty(self.mesh, self.law, a, found.fibril_b) * self.weight[a])
+        penalty = self.part * pair_penalty(self.mesh, self.law, a, found.fibril_b)
+        return np.asarray(found.sign * penalty * self.weight[a])
 
     def longest(self, q: Floats, direction: Floats) -> float:
         """The part of `direction` that the centre lines can go without colliding (`safe_step`).

@@ -14,10 +14,11 @@ and the metric of its strains change.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import compiled
 
 N_STRAINS = 5
@@ -25,6 +26,29 @@ LEAST, LARGEST = 0.64, 1.5625
 """J^2 between which the series of the logarithm serves: |z| < 0.22."""
 SERIES = 12
 """Its terms: the next is below 0.22^24 / 25 < 1e-17 of the first."""
+
+
+class Elements(NamedTuple):
+    """M elements of n nodes with Q line points and S section points, as compiled functions take them."""
+
+    nodes: Ints
+    """(M, n), those of an element one after another."""
+    shape: Floats
+    """(Q, n) shape functions at the line points."""
+    slope: Floats
+    """(M, Q, n) their derivatives, 1/mm."""
+    weight: Floats
+    """(M, Q, S) volumes that section points stand for, mm3; or (`section_force`) their areas, mm2."""
+    points: Floats
+    """(1 or M, 2, S) coordinates in the section, mm."""
+    natural: Floats
+    """(1 or M, Q, 5, 5) products of the natural strains."""
+    metric: Floats
+    """(M, Q, S, 3, 3) of curved natural shapes; (1, Q, 0, 3, 3) of straight ones."""
+    mu: Floats
+    """(M, S) Lamé parameters of the section points, MPa."""
+    lam: Floats
+    """(M, S)."""
 
 
 @compiled
@@ -204,26 +228,12 @@ def moments(weight: Any, points: Any, mu: Any, lam: Any, work: Any, p: Any, A: A
 
 
 @compiled
-def beam_energy(
-    first: int,
-    last: int,
-    x: Any,
-    nodes: Any,
-    shape: Any,
-    slope: Any,
-    weight: Any,
-    points: Any,
-    natural: Any,
-    metric: Any,
-    mu: Any,
-    lam: Any,
-    out: Any,
-) -> None:
+def beam_energy(first: int, last: int, x: Any, elements: Any, out: Any) -> None:
     """Fill out (M,) with the elastic energy, N mm, of elements first to last; infinite where one is inside out.
 
-    x (N, 9); nodes (M, n); shape (Q, n); slope (M, Q, n); weight (M, Q, S) volumes; points (1 or M, 2, S); natural
-    (1 or M, Q, 5, 5); metric (1, Q, 0, 3, 3) or (M, Q, S, 3, 3); mu, lam (M, S).
+    x (N, 9).
     """
+    nodes, shape, slope, weight, points, natural, metric, mu, lam = elements
     u, normal, j, work = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, weight.shape[2]))
     d = np.empty((N_STRAINS, N_STRAINS))
     for e in range(first, last):
@@ -238,26 +248,12 @@ def beam_energy(
 
 
 @compiled
-def section_force(
-    first: int,
-    last: int,
-    x: Any,
-    nodes: Any,
-    shape: Any,
-    slope: Any,
-    area: Any,
-    points: Any,
-    natural: Any,
-    metric: Any,
-    mu: Any,
-    lam: Any,
-    quadratic: Any,
-    force: Any,
-) -> None:
-    """Fill force (M, Q, 3) with the section force dE/dr' = ∫ P E3 dA, N; area (M, Q, S) section weights, mm2.
+def section_force(first: int, last: int, x: Any, elements: Any, quadratic: Any, force: Any) -> None:
+    """Fill force (M, Q, 3) with the section force dE/dr' = ∫ P E3 dA, N, of elements whose weights are areas.
 
-    quadratic (M, Q, 5, 5): the part of it that is linear in u.
+    x (N, 9); quadratic (M, Q, 5, 5): the part of it that is linear in u.
     """
+    nodes, shape, slope, area, points, natural, metric, mu, lam = elements
     u, normal, j, work = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, area.shape[2]))
     d, p, A = np.empty((N_STRAINS, N_STRAINS)), np.empty(3), np.empty((3, 3))
     for e in range(first, last):

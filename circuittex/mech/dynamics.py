@@ -175,8 +175,8 @@ def march(
     """
     _check_positive(dt=dt)
     inertia = Inertia(mass, damping, dt)
-    free = np.ones(len(q), dtype=bool)
-    free[fixed] = False
+    free_dofs = np.ones(len(q), dtype=bool)
+    free_dofs[fixed] = False
     driven = bool(np.any(velocity[fixed]))
     for step in count(1):
         inertia.depart(q, velocity)
@@ -191,7 +191,7 @@ def march(
             force_tolerance=tolerance,
             max_iterations=max_iterations,
         )
-        velocity, q = np.where(free, (found.q - q) / dt, velocity), found.q
+        velocity, q = np.where(free_dofs, (found.q - q) / dt, velocity), found.q
         gradient = found.gradient - inertia.gradient(q)
         yield Instant(
             time=step * dt,
@@ -200,7 +200,7 @@ def march(
             gradient=gradient,
             energy=found.energy - inertia.energy(q),
             kinetic=inertia.kinetic(velocity),
-            residual=float(scales.forces(np.where(free, gradient, 0.0)).max()),
+            residual=float(scales.forces(np.where(free_dofs, gradient, 0.0)).max()),
             iterations=found.iterations,
         )
 

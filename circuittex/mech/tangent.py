@@ -145,7 +145,7 @@ def add_tangent(first: int, last: int, x: Any, elements: Any, stiffness: Any, ou
     """
     nodes, shape, slope, weight, points, natural, metric, mu, lam = elements
     indptr, gradient, data = sums
-    u, normal, j, work = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, weight.shape[2]))
+    u, normal, j, scratch = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, weight.shape[2]))
     d, p, A = np.empty((N_STRAINS, N_STRAINS)), np.empty(3), np.empty((3, 3))
     V, W = np.zeros((RANK, WIDTH)), np.zeros((RANK, WIDTH))
     vectors = stiffness.shape[1]
@@ -155,11 +155,11 @@ def add_tangent(first: int, last: int, x: Any, elements: Any, stiffness: Any, ou
         out[e], g[:], C[:] = 0.0, 0.0, 0.0
         for q in range(shape.shape[0]):
             strains(nodes[e], x, shape[q], slope[e, q], u, normal)
-            if not section(u, normal, natural[shaped, q], metric[shaped, q], points[block], d, j, work):
+            if not section(u, normal, natural[shaped, q], metric[shaped, q], points[block], d, j, scratch):
                 out[e] = np.inf
                 continue
-            out[e] += energy(weight[e, q], mu[e], lam[e], work)
-            moments(weight[e, q], points[block], mu[e], lam[e], work, p, A)
+            out[e] += energy(weight[e, q], mu[e], lam[e], scratch)
+            moments(weight[e, q], points[block], mu[e], lam[e], scratch, p, A)
             here = slice(3 * q, 3 * q + 3)
             _volume_slopes(u, normal, shape[q], slope[e, q], V[here])
             _weighted(p, A, V[here], W[here], g)

@@ -62,7 +62,7 @@ def reach(
             start,
             step.before,
             step.after,
-            free=step.free,
+            free_edges=step.free_edges,
             solver=solver(),
             report=report,
             say=lambda text: say(f"{step.name}: {text}\n"),

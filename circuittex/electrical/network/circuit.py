@@ -133,9 +133,9 @@ def _resistors_apart(contacts: ContactState) -> _Apart:
 def _joined(contacts: ContactState, apart: _Apart, terminals: Sequence[Terminal], dropped_contacts: int) -> Circuit:
     """Join the sites of each terminal, and keep what the terminals reach."""
     port_of_site = _join(contacts.mesh, terminals, apart.end_site, len(apart.xi))
-    free = port_of_site < 0
-    inner = np.flatnonzero(free)
-    node = np.where(free, len(terminals) + np.cumsum(free) - 1, port_of_site)
+    unjoined = port_of_site < 0
+    inner = np.flatnonzero(unjoined)
+    node = np.where(unjoined, len(terminals) + np.cumsum(unjoined) - 1, port_of_site)
     pairs = node[apart.site]
     loop = pairs[:, 0] == pairs[:, 1]  # both ends in one terminal: no current
     keep = np.flatnonzero(~loop)

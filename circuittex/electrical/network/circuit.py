@@ -187,6 +187,29 @@ def reached_part(circuit: Circuit, ports: Iterable[str]) -> Circuit:
     )
 
 
+def with_ports(circuit: Circuit, ports: Sequence[str]) -> Circuit:
+    """Return the circuit with its ports, which are the first of its nodes, in another order.
+
+    >>> line = reached_part(reduced_circuit((1, 1), 1.0, np.inf), ["warp1_plus"])
+    >>> turned = with_ports(line, ["warp1_plus", "warp1_minus"])
+    >>> turned.node_names, turned.resistor_nodes.tolist()
+    (('warp1_plus', 'warp1_minus', 'warp1_at_weft1'), [[1, 2], [2, 0]])
+    """
+    if tuple(ports) == circuit.ports:
+        return circuit
+    first = port_nodes(circuit, ports)
+    nodes = np.concatenate([first, np.setdiff1d(np.arange(circuit.n_nodes), first)])
+    return replace(
+        circuit,
+        node_names=tuple([circuit.node_names[i] for i in nodes.tolist()]),
+        node_fibril=circuit.node_fibril[nodes],
+        node_xi=circuit.node_xi[nodes],
+        resistor_nodes=np.argsort(nodes)[circuit.resistor_nodes],
+        ports=tuple(ports),
+        port_node=np.arange(len(first)),
+    )
+
+
 def islands(circuit: Circuit) -> Ints:
     """Return for each node the number (K,) of the connected part of the circuit it belongs to.
 

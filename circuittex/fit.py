@@ -28,7 +28,7 @@ _BEYOND = 10.0
 _AMPLIFIED = 100.0
 # A misfit below this fraction of the currents is rounding.
 _EXACT = 1e-15
-POOR = 0.1
+POOR = 0.05
 """A network that misses a current or a resistance by more than this part does not describe the cell: a warning."""
 
 
@@ -133,9 +133,10 @@ def fit_network(
         one = _of_match(design, match, values, k, best)
     kinds, q = _kind_pairs(design), grouping.crossing_group
     per_pair = {name: crossings[where] for name, where in kinds.items() if (q[where] >= 0).any()}
-    warnings = one.warnings
+    warnings, one_rc = one.warnings, method == "probes" and q.size > 1
     if errors[0] > POOR:
-        warnings += (f"the reduced network is off by up to {100 * errors[0]:.2g} % between two yarn ends",)
+        way_out = '; with electrical.fit = "all-pairs" each crossing has a resistance of its own' if one_rc else ""
+        warnings += (f"the reduced network is off by up to {100 * errors[0]:.2g} % between two yarn ends{way_out}",)
     elif one.residual > POOR:
         warnings += (f"the reduced network misses the currents by up to {100 * one.residual:.2g} %",)
     return replace(

@@ -20,6 +20,8 @@ from circuittex.electrical.fields.solution import Mesh
 from circuittex.electrical.fields.system import build_system, outflow
 
 AREA = np.pi * 0.15**2
+FLOATING = 1e-10
+"""Relative: what lies between two feet of a floating fibril is at most 3e-11 of a contact's resistance."""
 
 LEFT, RIGHT = Terminal("left", (("warp1", -1),)), Terminal("right", (("warp1", 1),))
 OTHER_LEFT, OTHER_RIGHT = Terminal("other-left", (("warp2", -1),)), Terminal("other-right", (("warp2", 1),))
@@ -212,6 +214,25 @@ def test_feet_next_to_one_another_cost_no_digits() -> None:
     near = replace(state, xi_a=np.round(np.minimum(state.xi_a, 7.9), 1) + 1e-7 * np.arange(state.n_contacts))
     for found in solve_probes(near, PAPER_TERMINALS, PAPER_PROBES):
         assert balanced(found)
+
+
+@pytest.mark.parametrize("mesh", ["feet", "mechanical"])
+@pytest.mark.parametrize("weaker", [1e-3, 1e-9, 1e-14])
+def test_a_fibril_that_floats_on_weak_contacts(weaker: float, mesh: Mesh) -> None:
+    """Two fibrils joined by a third that nothing else holds: three resistances in series, and the third at half.
+
+    The contacts are up to 1e14 times weaker than a segment between their feet, so that a matrix which adds the two
+    keeps nothing of the contacts: found by drawing designs at random, where potentials of 1e4 V for 1 V came out.
+    """
+    gap = 1e-6
+    contact = 1e-2 * weaker
+    feet = np.array([4.0 - 3 * gap, 4.0 - gap, 4.0 + gap, 4.0 + 3 * gap])
+    state = touching(fibrils([8.0] * 3), [0, 0, 1, 1], [4.0] * 4, [2] * 4, feet, conductance=np.full(4, contact))
+    found = solve_fields(state, TERMINALS, ACROSS, mesh=mesh)
+    fibril = 8.0 / (10.0 * AREA)
+    total = fibril + 2 / (2 * contact)
+    assert_allclose(found.currents[0] * total, 1.0, rtol=FLOATING)
+    assert_allclose(found.potential[found.fibril == 2], 0.5, rtol=FLOATING)
 
 
 def test_equals_dense_kirchhoff() -> None:

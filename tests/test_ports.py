@@ -149,3 +149,14 @@ def test_no_data_is_no_value() -> None:
     match = match_pairs(design, groups(design, each_crossing=True), PortMatrix())
     assert np.isnan(match.values).all()
     assert "say nothing" in match.reasons[0]
+
+
+def test_yarns_that_touch_nowhere_are_known_and_their_crossings_not() -> None:
+    """Found by drawing designs at random: where the search began at the answer, it ended in 0 / 0."""
+    design = plain_weave(yarns=2, rows=(1,))
+    grouping = groups(design, each_crossing=True)
+    alone = grouping.start[:2]
+    match = match_pairs(design, grouping, port_matrix(reduced_circuit((2, 2), np.repeat(alone, 2), np.inf)))
+    assert match.values[:2] == pytest.approx(alone, rel=MATCHED)
+    assert np.isnan(match.values[2:]).all()
+    assert len(match.reasons) == 4

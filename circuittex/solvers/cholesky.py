@@ -28,6 +28,9 @@ from circuittex.solvers.levels import levels
 
 Solve = Callable[[Floats], Floats]
 
+SPARE = 1.25
+"""Room for structures that grow a little, before new memory is asked for."""
+
 
 def factorise(matrix: sp.sparray, position: Floats | None = None) -> Solve | None:
     """A function that solves with a symmetric matrix (n, n), or None if it is not positive definite.
@@ -52,12 +55,18 @@ def factorise(matrix: sp.sparray, position: Floats | None = None) -> Solve | Non
 
 
 class Cholesky:
-    """Cholesky's factorisation of matrices of one structure, whose `Analysis` tells the fronts."""
+    """Cholesky's factorisation of matrices of one structure, whose `Analysis` tells the fronts.
 
-    def __init__(self, analysis: Analysis) -> None:
+    It takes the memory over from `last`, which is of no use then: fresh pages cost as much as half a factorisation.
+    """
+
+    def __init__(self, analysis: Analysis, last: Cholesky | None = None) -> None:
         self.analysis = analysis
-        self._libraries = ThreadpoolController()
-        self._values = np.empty(analysis.size)
+        self._libraries: ThreadpoolController = ThreadpoolController() if last is None else last._libraries
+        self._room: Floats = np.empty(0) if last is None else last._room
+        if len(self._room) < analysis.size:
+            self._room = np.empty(int(SPARE * analysis.size))
+        self._values = self._room[: analysis.size]
         self._dense = [
             (front, self._view(front.start, p, p), self._view(front.start + p * p, p, len(front.border)))
             for front in analysis.fronts

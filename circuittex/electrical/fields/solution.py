@@ -23,6 +23,9 @@ from circuittex.geometry.mesh import FibrilMesh
 Mesh = Literal["feet", "mechanical"]
 """Nodes at the feet of the contacts, or those of the mechanics."""
 
+WEAK = 1e-10
+"""Contacts of a fibril this much weaker than a segment keep six digits in the matrix, which is enough to refine."""
+
 
 @frozen
 class Potential:
@@ -217,8 +220,9 @@ def _flow(
     live = reached[line.fibril]
     value = np.full(len(live), np.nan)
     value[line.ends[source]], value[line.ends[sink]] = probe.voltage, 0.0
-    V = balance(system, np.zeros((1, len(live))), value, np.flatnonzero(live & np.isnan(value)))[0]
-    through, along, into = _currents(line, system, V)
+    anchor = _anchor(contacts, line, np.any(source | sink, axis=0))
+    V = balance(system, np.zeros((1, len(live))), value, np.flatnonzero(live & np.isnan(value)), anchor)[0]
+    through, along, into = _currents(line, system, V, source | sink)
     conduction = line.conduction
     return _Flow(
         potential=np.where(live, V, np.nan),
@@ -228,6 +232,21 @@ def _flow(
         fibril_heat=np.divide(along**2, conduction, out=np.zeros_like(along), where=conduction > 0.0),
         contact_heat=through * (system.jump @ V),
     )
+
+
+def _anchor(contacts: ContactState, line: FibrilLine, held: NDArray[np.bool_]) -> Ints | None:
+    """(K,) the first node of a fibril that hangs on contacts much weaker than its segments, else the node itself."""
+    n = len(held)
+    G = _electric_conductance(contacts)
+    hung = np.bincount(contacts.fibril_a, G, n) + np.bincount(contacts.fibril_b, G, n)
+    segment = np.zeros(n)
+    length = np.diff(line.xi[line.segments], axis=1)[:, 0]
+    np.maximum.at(segment, line.fibril[line.segments[:, 0]], line.conduction / length)
+    afloat = ~held & (hung < WEAK * segment)
+    if not afloat.any():
+        return None
+    anchor: Ints = np.where(afloat[line.fibril], line.ends[0][line.fibril], np.arange(len(line.fibril)))
+    return anchor
 
 
 def _held(mesh: FibrilMesh, terminals: Sequence[Terminal], name: str) -> NDArray[np.bool_]:
@@ -253,12 +272,13 @@ def _reached(contacts: ContactState, driven: Ints) -> NDArray[np.bool_]:
     return reached
 
 
-def _currents(line: FibrilLine, system: System, V: Floats) -> tuple[Floats, Floats, Floats]:
+def _currents(line: FibrilLine, system: System, V: Floats, held: NDArray[np.bool_]) -> tuple[Floats, Floats, Floats]:
     """Currents through the contacts (C,), along the elements (S,), and into both fibril ends (2, F).
 
     The difference of V over a short element loses the digits that its large conductance multiplies. So the
-    current at xi = 0 follows from the whole fibril, V0 - VL = sum R_s i_s, and all others by subtracting what
-    the contacts drain on the way (Kirchhoff): the same numbers without that loss.
+    current at xi = 0 is what the contacts drain in all where xi = L is not `held` (2, F), nothing where it is not held
+    itself, and else follows from the whole fibril, V0 - VL = sum R_s i_s; all others are that less what the contacts
+    drain on the way (Kirchhoff): the same numbers without that loss.
     """
     through = system.conductance * (system.jump @ V)
     leaving = system.jump.T @ through
@@ -271,9 +291,10 @@ def _currents(line: FibrilLine, system: System, V: Floats) -> tuple[Floats, Floa
     before = total[first] - leaving[first]
     drained = total[left] - before[owner]
     R_fibril, lost = (np.bincount(owner, w, len(first)) for w in (R, R * drained))
-    entering = np.divide(V[first] - V[last] + lost, R_fibril, out=np.zeros_like(lost), where=R_fibril > 0.0)
+    through_all = np.divide(V[first] - V[last] + lost, R_fibril, out=np.zeros_like(lost), where=R_fibril > 0.0)
+    entering = np.where(held.all(axis=0), through_all, np.where(held[0], total[last] - before, 0.0))
     along = np.where(conducting, entering[owner] - drained, 0.0)
-    return through, along, np.stack([entering, total[last] - before - entering])
+    return through, along, np.where(held, np.stack([entering, total[last] - before - entering]), 0.0)
 
 
 def _joule_heat(thermal: System, flow: _Flow, contact_heat: bool) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags_array
+from scipy.sparse import csr_matrix, diags_array, identity
 from scipy.sparse.linalg import splu
 from skfem import BilinearForm, ElementLineP0, LinearForm
 from skfem.helpers import dot, grad
@@ -27,12 +27,17 @@ class System:
     """Conduction of the fibrils at the quadrature points."""
     conductance: Floats
     """(C,) of the contacts."""
-    stiffness: Any
-    """(N, N), contacts included."""
+    conduction: Any
+    """(N, N) stiffness of the fibrils alone."""
     foot: Any
     """Two of (C, N): the field at the feet on fibrils a and b."""
     jump: Any
     """(C, N): difference of the two."""
+
+    @property
+    def stiffness(self) -> Any:
+        """(N, N), contacts included."""
+        return self.conduction + _coupling(self.jump, self.conductance)
 
 
 @BilinearForm  # type: ignore[untyped-decorator]
@@ -52,8 +57,12 @@ def build_system(basis: Any, line: FibrilLine, coefficient: Floats, conductance:
     foot = [_evaluation(basis, *at) for at in zip(line.foot_segment, line.foot_local, strict=True)]
     jump = foot[0] - foot[1]
     along = basis.with_element(ElementLineP0()).interpolate(coefficient)
-    stiffness = csr_matrix(_conduction.assemble(basis, coefficient=along) + jump.T @ diags_array(conductance) @ jump)
-    return System(basis, along, conductance, stiffness, foot, jump)
+    return System(basis, along, conductance, csr_matrix(_conduction.assemble(basis, coefficient=along)), foot, jump)
+
+
+def _coupling(jump: Any, conductance: Floats) -> Any:
+    """(N, N) stiffness of the contacts."""
+    return csr_matrix(jump.T @ diags_array(conductance) @ jump)
 
 
 def _evaluation(basis: Any, segment: Ints, local: Floats) -> Any:
@@ -88,25 +97,48 @@ def outflow(system: System, x: Floats) -> Floats:
     return inside + outside
 
 
-def balance(system: System, load: Floats, value: Floats, free_dofs: Ints) -> Floats:
-    """Balance `load` (n, N) in the dofs `free_dofs`; elsewhere x is `value` (N,), and 0 where that is nan."""
+def balance(system: System, load: Floats, value: Floats, free_dofs: Ints, anchor: Ints | None = None) -> Floats:
+    """Balance `load` (n, N) in the dofs `free_dofs`; elsewhere x is `value` (N,), and 0 where that is nan.
+
+    A fibril that hangs on its contacts alone moves as a whole, and where these are ten decades weaker than its
+    segments, nothing of them is left in the assembled matrix. `anchor` (N,) names for each dof the one on its fibril
+    from which it is measured, or itself: then the segments' part in the anchor's row is zero by construction, not by
+    cancellation.
+    """
     x = np.nan_to_num(np.tile(value, (len(load), 1)))
     if not len(free_dofs):
         return x
+    move, fibrils, jump = _measured(system, anchor)
     # Positive definite, so no pivoting: as fast as COLAMD on the paper's cell, three times as fast on a denser one.
     # Panels and relaxed supernodes double the time on the paper's cell and save none on denser ones.
     factor = splu(
-        system.stiffness[free_dofs][:, free_dofs].tocsc(),
+        (fibrils + _coupling(jump, system.conductance))[free_dofs][:, free_dofs].tocsc(),
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
         panel_size=1,
         relax=1,
         options={"SymmetricMode": True},
     )
+    move = move[free_dofs][:, free_dofs]
     for _ in range(1 + REFINEMENTS):
         residual = load - np.stack([outflow(system, row) for row in x])
-        x[:, free_dofs] += factor.solve(residual[:, free_dofs].T).T
+        x[:, free_dofs] += (move @ factor.solve(move.T @ residual[:, free_dofs].T)).T
     return x
+
+
+def _measured(system: System, anchor: Ints | None) -> tuple[Any, Any, Any]:
+    """What makes values of those above the anchors (N, N), and the fibrils' stiffness and the jumps in their terms."""
+    n = system.conduction.shape[0]
+    every = np.arange(n)
+    if anchor is None:
+        return identity(n, format="csr"), system.conduction, system.jump
+    led = np.flatnonzero(anchor != every)
+    move = csr_matrix(
+        (np.ones(n + len(led)), (np.concatenate([every, led]), np.concatenate([every, anchor[led]]))), shape=(n, n)
+    )
+    own = np.ones(n)
+    own[anchor[led]] = 0.0
+    return move, diags_array(own) @ system.conduction @ diags_array(own), csr_matrix(system.jump @ move)
 
 
 def peak(basis: Any, temperature: Floats) -> float:

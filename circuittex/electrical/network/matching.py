@@ -217,8 +217,11 @@ def _matched(design: Design, grouping: Groups, target: Floats, model: Model, dat
     logs = np.log(np.where(unknown, 1.0, grouping.start))
     starts = [np.where(unknown, segment + step, logs) for step in np.log(RATIOS)]
     start = min(starts, key=lambda each: float(np.linalg.norm(both(each)[0])))
-    wide = np.where(unknown, np.log(BEYOND * RATIOS[-1]), np.log(BEYOND))
-    bounds = np.where(unknown, segment, logs) - wide, np.where(unknown, segment, logs) + wide
+    middle = np.where(unknown, segment, logs)
+    bounds = (
+        middle + np.where(unknown, np.log(RATIOS[0] / BEYOND), -np.log(BEYOND)),
+        middle + np.where(unknown, np.log(RATIOS[-1] * BEYOND), np.log(BEYOND)),
+    )
 
     def misfits(logs: Floats) -> Floats:
         return both(logs)[0]
@@ -226,7 +229,9 @@ def _matched(design: Design, grouping: Groups, target: Floats, model: Model, dat
     def slopes(logs: Floats) -> Floats:
         return both(logs)[1]
 
-    found = least_squares(misfits, start, jac=slopes, bounds=bounds, x_scale="jac", xtol=1e-14, ftol=None, gtol=None)
+    # Without a limit for the slope, a start that fits to the last bit ends in 0 / 0.
+    limits = {"xtol": 1e-14, "ftol": None, "gtol": float(np.finfo(float).eps)}
+    found = least_squares(misfits, start, jac=slopes, bounds=bounds, x_scale="jac", **limits)
     names = [*(f"Ry of {kind}" for kind in grouping.yarns), *(f"Rc of {pair}" for pair in grouping.crossings)]
     reasons, lost = _undetermined(found.jac, names, data)
     return Match(np.exp(found.x), lost, float(np.expm1(np.abs(found.fun).max())), reasons)

@@ -106,7 +106,7 @@ def test_a_fibril_is_stopped_before_it_falls_through_another(gap: float) -> None
     mesh, way = crossing(gap), 3.0
     found = step(mesh, lowered(mesh, way))
     least = COLLISION * min(gap, 2 * R)
-    assert (gap - (1 + CLOSEST) * least) / way - ROUND_OFF <= found.part <= (gap - least) / way + ROUND_OFF
+    assert (gap - (1 + CLOSEST) * least) / way - ROUND_OFF <= found.fraction <= (gap - least) / way + ROUND_OFF
     assert found.fibrils == (0, 1)
     assert found.distance == pytest.approx(gap, rel=1e-9)
 
@@ -114,8 +114,8 @@ def test_a_fibril_is_stopped_before_it_falls_through_another(gap: float) -> None
 def test_what_ends_just_outside_is_not_limited() -> None:
     gap = 2 * R
     mesh = crossing(gap)
-    assert step(mesh, lowered(mesh, (1 - (1 + CLOSEST) * COLLISION) * gap - 1e-9)).part == 1.0
-    assert step(mesh, lowered(mesh, gap)).part < 1.0
+    assert step(mesh, lowered(mesh, (1 - (1 + CLOSEST) * COLLISION) * gap - 1e-9)).fraction == 1.0
+    assert step(mesh, lowered(mesh, gap)).fraction < 1.0
 
 
 @pytest.mark.parametrize("gap", [0.05, 0.2, 2 * R, 0.5])
@@ -124,10 +124,10 @@ def test_a_fibril_is_stopped_before_it_falls_through_itself(gap: float) -> None:
     last = mesh.xi > mesh.length[0] - 1.6  # of the way back, more than half
     found = step(mesh, last[:, None] * np.array([0.0, 0.0, -way]))
     least = COLLISION * min(gap, 2 * R)
-    assert (gap - (1 + CLOSEST) * least) / way - ROUND_OFF <= found.part <= (gap - least) / way + ROUND_OFF
+    assert (gap - (1 + CLOSEST) * least) / way - ROUND_OFF <= found.fraction <= (gap - least) / way + ROUND_OFF
     assert found.fibrils == (0, 0)
     assert found.distance == pytest.approx(gap, rel=1e-9)
-    assert step(mesh, last[:, None] * np.array([0.0, 0.0, way])).part == 1.0
+    assert step(mesh, last[:, None] * np.array([0.0, 0.0, way])).fraction == 1.0
 
 
 def test_a_hairpin_may_close_until_its_legs_touch() -> None:
@@ -140,8 +140,8 @@ def test_a_hairpin_may_close_until_its_legs_touch() -> None:
         return np.vstack([lower, arc, upper])
 
     mesh = fibrils_through([pin(2 * R)])
-    assert step(mesh, pin(R) - mesh.position).part == 1.0
-    assert step(mesh, pin(-R) - mesh.position).part < 1.0
+    assert step(mesh, pin(R) - mesh.position).fraction == 1.0
+    assert step(mesh, pin(-R) - mesh.position).fraction < 1.0
 
 
 @pytest.mark.parametrize("motion", ["apart", "along", "together", "past the end"])
@@ -155,24 +155,24 @@ def test_harmless_motions_are_not_limited(motion: str) -> None:
         "together": np.full((mesh.n_nodes, 3), 50.0),
         "past the end": upper * np.array([50.0, 0.0, -1.0]),
     }[motion]
-    assert step(mesh, way).part == 1.0
+    assert step(mesh, way).fraction == 1.0
 
 
 def test_parallel_fibrils_of_a_yarn_do_not_pass_either() -> None:
     mesh = fibrils_through([straight([-1, y, 0], [1, y, 0], 6) for y in (0.0, 2 * R)])
     found = step(mesh, (mesh.node_fibril == 1)[:, None] * np.array([0.0, -4 * R, 0.0]))
-    assert found.part == pytest.approx(0.5 * (1 - COLLISION), abs=0.5 * CLOSEST * COLLISION + ROUND_OFF)
+    assert found.fraction == pytest.approx(0.5 * (1 - COLLISION), abs=0.5 * CLOSEST * COLLISION + ROUND_OFF)
 
 
 def test_of_several_collisions_the_first_counts_whatever_the_order() -> None:
     mesh = tangle(11, fibrils=6)
     motion = np.random.default_rng(0).normal(size=(mesh.n_nodes, 3))
     found = step(mesh, motion)
-    assert found.part < 1.0
+    assert found.fraction < 1.0
     order = [4, 2, 0, 5, 1, 3]
     other, node = renumbered(mesh, order)
     again = step(other, motion[node])
-    assert again.part == found.part
+    assert again.fraction == found.fraction
     assert sorted(order[f] for f in again.fibrils) == sorted(found.fibrils)
 
 
@@ -181,7 +181,7 @@ def test_a_scaled_motion_has_the_same_part_to_the_last_bit(power: int) -> None:
     mesh, scale = tangle(12, fibrils=6), 2.0**power
     motion = np.random.default_rng(1).normal(size=(mesh.n_nodes, 3))
     scaled = replace(mesh, position=scale * mesh.position, radius=scale * mesh.radius)
-    assert step(scaled, scale * motion).part == step(mesh, motion).part < 1.0
+    assert step(scaled, scale * motion).fraction == step(mesh, motion).fraction < 1.0
 
 
 # ---- against brute force ----------------------------------------------------------------------------------
@@ -195,7 +195,7 @@ def test_a_safe_part_is_safe_at_every_moment(seed: int, size: float, radius: flo
     rng = np.random.default_rng(seed)
     smooth = np.cumsum(rng.normal(size=(mesh.n_nodes, 3)), axis=0) / 3
     motion = size * (rng.normal(size=(mesh.n_fibrils, 3))[mesh.node_fibril] + smooth)
-    part = step(mesh, motion).part
+    part = step(mesh, motion).fraction
     first, fibrils = chord_distances(mesh, mesh.position)
     least = COLLISION * np.minimum(first, mesh.radius[fibrils].sum(axis=1))
     for t in part * np.linspace(0.0, 1.0, TIMES):

@@ -226,7 +226,7 @@ def test_wires_that_nothing_holds_any_more_are_at_rest() -> None:
     now, gradient = relax(mesh, design).configuration, np.eye(2)
     for strain in (0.005, 0.01, 0.02):
         pulled = np.diag([1.0 + strain, 1.0])
-        step = advance(mesh, design, now, gradient, pulled, free="y")
+        step = advance(mesh, design, now, gradient, pulled, free_edges="y")
         assert step.parts == 1
         now, gradient = step.equilibrium.configuration, pulled
     assert step.iterations <= 20

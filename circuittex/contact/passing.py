@@ -47,13 +47,13 @@ PRESSED = 1 / 50
 
 @frozen
 class SafeStep:
-    """The part of a motion that is safe, and the pair of fibrils that limits it."""
+    """The fraction of a motion that is safe, and the pair of fibrils that limits it."""
 
-    part: float
+    fraction: float
     """From 0 to 1; 1: nothing collides."""
     fibrils: tuple[int, int]
     """The pair that limits it, the lower number first, or twice the one that collides with itself; meaningless where
-    `part` is 1."""
+    `fraction` is 1."""
     distance: float
     """The distance at the start of the chords of that pair that collide, mm."""
 
@@ -92,9 +92,9 @@ def safe_step(table: CurveTable, radius: Floats, r: Floats, motion: Floats) -> S
     >>> r = np.vstack([t * [1.0, 0.0, 0.0], t * [0.0, 1.0, 0.0] + [0.0, 0.0, 0.5]])
     >>> table = CurveTable(np.array([0, 3, 6]), np.repeat([0, 1], 3), np.repeat([0, 4], 3), np.array([0, 1, 2] * 2))
     >>> down = np.repeat([[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]], 4, axis=0)
-    >>> safe_step(table, np.array([0.3, 0.3]), r, down).part  # from 0.5 to a quarter of it
+    >>> safe_step(table, np.array([0.3, 0.3]), r, down).fraction  # from 0.5 to a quarter of it
     0.375
-    >>> safe_step(table, np.array([0.3, 0.3]), r, -down).part
+    >>> safe_step(table, np.array([0.3, 0.3]), r, -down).fraction
     1.0
     """
     start, way = chords(table, r), chords(table, motion)
@@ -103,11 +103,11 @@ def safe_step(table: CurveTable, radius: Floats, r: Floats, motion: Floats) -> S
     low = np.minimum(start, end).min(axis=1) - reach
     high = np.maximum(start, end).max(axis=1) + reach
     axis = int(np.argmax(np.ptp(low, axis=0)))
-    order = np.argsort(low[:, axis], kind="stable")
+    rising = np.argsort(low[:, axis], kind="stable")
     turned = np.roll(np.arange(3), -axis)  # the axis of the sweep first
-    low, high = (np.ascontiguousarray(box[order][:, turned]) for box in (low, high))
+    low, high = (np.ascontiguousarray(box[rising][:, turned]) for box in (low, high))
     found = np.array([1.0, 0.0, 0.0, np.inf])
-    _sweep(order, low, high, table.fibril, radius, start, way, _along(table.fibril, start), found)
+    _sweep(rising, low, high, table.fibril, radius, start, way, _along(table.fibril, start), found)
     pair = sorted(found[1:3].astype(int).tolist())
     return SafeStep(float(found[0]), (pair[0], pair[1]), float(found[3]))
 
@@ -171,13 +171,13 @@ def segment_distance(p: Any, q: Any, r: Any, s: Any) -> float:
 
 
 @compiled
-def _distance_at(t: float, p: Any, u: Any, q: Any, v: Any, work: Any) -> float:
-    """Distance of chords p and q (2, 3) after the part t of their motions u and v; work (4, 3)."""
+def _distance_at(t: float, p: Any, u: Any, q: Any, v: Any, scratch: Any) -> float:
+    """Distance of chords p and q (2, 3) after the part t of their motions u and v; scratch (4, 3)."""
     for e in range(2):
         for k in range(3):
-            work[e, k] = p[e, k] + t * u[e, k]
-            work[2 + e, k] = q[e, k] + t * v[e, k]
-    return segment_distance(work[0], work[1], work[2], work[3])
+            scratch[e, k] = p[e, k] + t * u[e, k]
+            scratch[2 + e, k] = q[e, k] + t * v[e, k]
+    return segment_distance(scratch[0], scratch[1], scratch[2], scratch[3])
 
 
 @compiled
@@ -191,9 +191,9 @@ def _relative_motion(u: Any, v: Any) -> float:
 
 
 @compiled
-def _safe_part(p: Any, u: Any, q: Any, v: Any, touch: float, work: Any, first: Any) -> float:
+def _safe_fraction(p: Any, u: Any, q: Any, v: Any, touch: float, scratch: Any, first: Any) -> float:
     """The safe part of the motion of two chords (`safe_step`); first (1,) receives their distance at its start."""
-    d = _distance_at(0.0, p, u, q, v, work)
+    d = _distance_at(0.0, p, u, q, v, scratch)
     first[0] = d
     scale, fastest = min(d, touch), _relative_motion(u, v)
     if fastest == 0.0 or d - fastest > COLLISION * scale:
@@ -203,7 +203,7 @@ def _safe_part(p: Any, u: Any, q: Any, v: Any, touch: float, work: Any, first: A
         t += (d - COLLISION * scale) / fastest
         if t >= 1.0:
             return 1.0
-        d = _distance_at(t, p, u, q, v, work)
+        d = _distance_at(t, p, u, q, v, scratch)
         if d <= (1.0 + CLOSEST) * COLLISION * scale:
             break
     return t
@@ -211,23 +211,23 @@ def _safe_part(p: Any, u: Any, q: Any, v: Any, touch: float, work: Any, first: A
 
 @compiled
 def _sweep(
-    order: Any, low: Any, high: Any, fibril: Any, radius: Any, start: Any, way: Any, along: Any, found: Any
+    rising: Any, low: Any, high: Any, fibril: Any, radius: Any, start: Any, way: Any, along: Any, found: Any
 ) -> None:
     """The least safe part of all pairs of chords but neighbours, with the pair and its distance, in found (4,).
 
-    order (I,): the intervals by the lower end along the first axis of the boxes that they sweep; these boxes low, high
+    rising (I,): the intervals by the lower end along the first axis of the boxes that they sweep; these boxes low, high
     (I, 3) stand in that order; along (I, CHORDS + 1) as `_along`.
     """
-    work, first = np.empty((4, 3)), np.empty(1)
-    for n in range(order.shape[0]):
-        i = order[n]
+    scratch, first = np.empty((4, 3)), np.empty(1)
+    for n in range(rising.shape[0]):
+        i = rising[n]
         f, ends, x, y, z, w = fibril[i], high[n, 0], low[n, 1], high[n, 1], low[n, 2], high[n, 2]
-        for m in range(n + 1, order.shape[0]):
+        for m in range(n + 1, rising.shape[0]):
             if low[m, 0] > ends:
                 break
             if low[m, 1] > y or high[m, 1] < x or low[m, 2] > w or high[m, 2] < z:
                 continue
-            j = order[m]
+            j = rising[m]
             own, near = fibril[j] == f, NEIGHBOURS * radius[f]
             if own and max(along[j, -1] - along[i, 0], along[i, -1] - along[j, 0]) < near:
                 continue
@@ -240,9 +240,9 @@ def _sweep(
                         continue
                     if not _may_meet(p, u, q, v, COLLISION * touch):
                         continue
-                    part = _safe_part(p, u, q, v, touch, work, first)
-                    if part < found[0]:
-                        found[0], found[1], found[2], found[3] = part, f, fibril[j], first[0]
+                    fraction = _safe_fraction(p, u, q, v, touch, scratch, first)
+                    if fraction < found[0]:
+                        found[0], found[1], found[2], found[3] = fraction, f, fibril[j], first[0]
 
 
 @compiled

@@ -177,10 +177,10 @@ class PenaltyContact:
         """
         mesh = self.mesh
         step = safe_step(self.table, mesh.radius, self.positions(q), self.positions(direction))
-        if step.part < 1.0 and step.distance < PRESSED * mesh.radius[list(step.fibrils)].sum():
+        if step.fraction < 1.0 and step.distance < PRESSED * mesh.radius[list(step.fibrils)].sum():
             what = f"{pair_label(mesh, *step.fibrils)} are pressed through one another"
             raise PenetrationError(f"{what}; {likely_cause(mesh, self.law, *step.fibrils)}")
-        return step.part
+        return step.fraction
 
     def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
         """Add gradient and tangent in place, the turning of the contact force to `softening`; return the energy."""
@@ -208,6 +208,6 @@ class PenaltyContact:
         pieces = min(cores(), 1 + len(window_a) // WORTH_A_THREAD)
         # The rows of the lower window hold the blocks of both, those of the higher only its own.
         low, high = np.minimum(window_a, window_b), np.maximum(window_a, window_b)
-        work = np.cumsum(3 * np.bincount(low, minlength=n) + np.bincount(high, minlength=n))
-        inner = np.searchsorted(work, work[-1] * np.arange(1, pieces) / pieces) + 1
+        cost = np.cumsum(3 * np.bincount(low, minlength=n) + np.bincount(high, minlength=n))
+        inner = np.searchsorted(cost, cost[-1] * np.arange(1, pieces) / pieces) + 1
         return [0, *np.minimum(inner, n).tolist(), n]

@@ -30,8 +30,8 @@ FIRST_SHIFT, LEAST_SHIFT = 1.0, 1e-3
 """Shifts, in parts of `Scales.metric`. The least keeps the fibrils' free spin about their axes, a true zero mode,
 solvable; it is a hundred thousand times softer than the softest bending mode of a span."""
 SOFTENING = (1.0, 0.7, 0.3)
-"""Parts of the softening tangent that are tried far from equilibrium, where a descent through sliding contacts
-takes fewer iterations with less of it than with a larger shift alone. The search begins one place before the part
+"""Fractions of the softening tangent that are tried far from equilibrium, where a descent through sliding contacts
+takes fewer iterations with less of it than with a larger shift alone. The search begins one place before the one
 that served last, since a factorisation that fails costs nearly as much as one that succeeds."""
 SADDLE = 2e-3
 """A largest free force below this part of the largest force of all, with a tangent that needs a shift, is a saddle:
@@ -153,10 +153,10 @@ class System:
 
 
 @compiled
-def _shifted(data: Any, part: float, softening: Any, shift: float, metric: Any, scaling: Any, values: Any) -> None:
-    """Fill values (nnz,) with (data + part softening + shift metric) scaling."""
+def _shifted(data: Any, fraction: float, softening: Any, shift: float, metric: Any, scaling: Any, values: Any) -> None:
+    """Fill values (nnz,) with (data + fraction softening + shift metric) scaling."""
     for k in range(values.shape[0]):
-        values[k] = (data[k] + part * softening[k] + shift * metric[k]) * scaling[k]
+        values[k] = (data[k] + fraction * softening[k] + shift * metric[k]) * scaling[k]
 
 
 def minimise(
@@ -189,15 +189,15 @@ def minimise(
     system = System(terms, scales, fixed, len(q))
     if before is not None:
         q = predict(system, solver, before, q)
-    shift, part, refused, step, history = FIRST_SHIFT, 0, False, 1.0, []
-    free = np.ones(len(q), dtype=bool)
-    free[fixed] = False
+    shift, place, refused, step, history = FIRST_SHIFT, 0, False, 1.0, []
+    free_dofs = np.ones(len(q), dtype=bool)
+    free_dofs[fixed] = False
     for iteration in range(max_iterations + 1):
         pattern, energy, gradient = system.assemble(q)
         if iteration == 0:
-            stiffness, metric = (values[diagonal(pattern)][free] for values in (system.data, system.metric))
+            stiffness, metric = (values[diagonal(pattern)][free_dofs] for values in (system.data, system.metric))
             system.largest_shift = LARGEST_SHIFT * float((stiffness / metric).max())
-        left, largest = scales.forces(np.where(free, gradient, 0.0)), float(scales.forces(gradient).max())
+        left, largest = scales.forces(np.where(free_dofs, gradient, 0.0)), float(scales.forces(gradient).max())
         residual, limits = float(left.max()), system.limits(q, tolerance, force_tolerance)
         history.append((residual, energy, shift, step))
         if report is not None:
@@ -214,15 +214,15 @@ def minimise(
         if last:
             break
         rough = residual > ROUGH * largest
-        parts = SOFTENING[part if refused or part == 0 else part - 1 :] if rough else SOFTENING[:1]
-        shift, part, solve = _positive(system, solver, shift, parts, history)
-        refused = SOFTENING[part] != parts[0]
+        fractions = SOFTENING[place if refused or place == 0 else place - 1 :] if rough else SOFTENING[:1]
+        shift, place, solve = _positive(system, solver, shift, fractions, history)
+        refused = SOFTENING[place] != fractions[0]
         if shift > FIRST_SHIFT and residual < SADDLE * largest:
-            lower = _escape(system, pattern, solve, q, energy, free)
+            lower = _escape(system, pattern, solve, q, energy, free_dofs)
             if lower is not None:
                 q, step, shift = lower, 1.0, FIRST_SHIFT
                 continue
-        force = np.where(free, gradient, 0.0)
+        force = np.where(free_dofs, gradient, 0.0)
         direction = solve(-force)
         slope = float(force @ direction)
         try:
@@ -271,25 +271,25 @@ def _positive(
     system: System,
     solver: LinearSolver,
     shift: float,
-    parts: Sequence[float],
+    fractions: Sequence[float],
     history: list[tuple[float, float, float, float]],
 ) -> tuple[float, int, Solve]:
     """The tangent made positive definite with less of its softening or else a larger shift.
 
-    Returns the shift, the place in `SOFTENING` of the part that served, and the factor. Of `parts`, the first
+    Returns the shift, the place in `SOFTENING` of the fraction that served, and the factor. Of `fractions`, the first
     that serves is taken.
     """
     while shift <= system.largest_shift:
-        for part in parts:
-            solve = system.factor(solver, shift, part)
+        for fraction in fractions:
+            solve = system.factor(solver, shift, fraction)
             if solve is not None:
-                return shift, SOFTENING.index(part), solve
+                return shift, SOFTENING.index(fraction), solve
         shift = max(4 * shift, FIRST_SHIFT)
     raise ConvergenceError("the tangent stays indefinite under any shift", np.array(history))
 
 
 def _escape(
-    system: System, pattern: Pattern, solve: Solve, q: Floats, energy: float, free: NDArray[np.bool_]
+    system: System, pattern: Pattern, solve: Solve, q: Floats, energy: float, free_dofs: NDArray[np.bool_]
 ) -> Floats | None:
     """A lower point along the mode of the lowest curvature, found by inverse iteration with the shifted factor; None
     where there is none within sight.
@@ -297,9 +297,9 @@ def _escape(
     Of the two senses the one that leads lower is taken; the step doubles for as long as that pays.
     """
     unit = system.scales.unit
-    mode = np.where(free, unit * np.random.default_rng(0).standard_normal(len(q)), 0.0)
+    mode = np.where(free_dofs, unit * np.random.default_rng(0).standard_normal(len(q)), 0.0)
     for _ in range(INVERSE_ITERATIONS):
-        mode = np.where(free, solve(np.where(free, multiply(pattern, system.metric, mode), 0.0)), 0.0)
+        mode = np.where(free_dofs, solve(np.where(free_dofs, multiply(pattern, system.metric, mode), 0.0)), 0.0)
         mode /= np.abs(mode / unit).max()
     best, lowest = None, energy
     for sense in (-1.0, 1.0):

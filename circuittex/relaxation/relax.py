@@ -45,10 +45,10 @@ class Equilibrium:
     """(Newton iterations + 1, 4) residual N, potential N mm, shift (`minimise`), step length, of the last descent."""
 
 
-def force_terms(mesh: FibrilMesh, design: Design, free: str = "") -> tuple[BeamSpace, Beam, PenaltyContact]:
+def force_terms(mesh: FibrilMesh, design: Design, free_edges: str = "") -> tuple[BeamSpace, Beam, PenaltyContact]:
     """The space of the fibrils and the two force terms, elasticity and contact, that a design asks for."""
     numerics = design.numerics
-    space = beam_space(mesh, free)
+    space = beam_space(mesh, free_edges)
     beam = Beam(space, degree=numerics.section_degree)
     contact = PenaltyContact(mesh, law=design.contact, per_element=design.resolution.contact_points)
     return space, beam, contact
@@ -60,18 +60,18 @@ def relax(
     start: Configuration | None = None,
     *,
     before: Configuration | None = None,
-    free: str = "",
+    free_edges: str = "",
     solver: LinearSolver | None = None,
     report: Callable[[int, float], None] | None = None,
 ) -> Equilibrium:
     """The equilibrium that descent from `start` (by default the initial weave) reaches, ends held as there.
 
     Where `start` was moved from the equilibrium `before`, the descent starts from what that predicts. The
-    ends of yarns along `free`, 'x' or 'y', are not held.
+    ends of yarns along `free_edges`, 'x' or 'y', are not held.
 
     Raises `ConvergenceError` with the history where it is not reached.
     """
-    space, beam, contact = force_terms(mesh, design, free)
+    space, beam, contact = force_terms(mesh, design, free_edges)
     start = start if start is not None else initial_configuration(mesh)
     moved = before is not None and not same(before, start)
     numerics, solver = design.numerics, solver if solver is not None else MultifrontalSolver()

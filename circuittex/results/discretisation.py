@@ -38,14 +38,14 @@ class QuantityError:
     """With twice as many contact points an element, in `unit`; nan likewise."""
 
     @property
-    def order(self) -> float:
+    def observed_order(self) -> float:
         """Observed order of convergence with the mesh; nan where the three values do not approach a limit."""
         return observed_order(self.coarse, self.value, self.fine)
 
     @property
     def regular(self) -> bool:
         """Whether the mesh part rests on Richardson's extrapolation rather than on bare differences."""
-        return self.order >= LEAST_ORDER
+        return self.observed_order >= LEAST_ORDER
 
     @property
     def mesh(self) -> float:
@@ -119,11 +119,11 @@ def mesh_error(coarse: float, value: float, fine: float) -> float:
     coarser, finer = abs(coarse - value), abs(value - fine)
     if not isfinite(finer):
         return nan
-    order = observed_order(coarse, value, fine)
-    if LEAST_ORDER <= order <= FORMAL_ORDER:
-        return SAFETY * finer / (1.0 - exp2(-order))
+    observed = observed_order(coarse, value, fine)
+    if LEAST_ORDER <= observed <= FORMAL_ORDER:
+        return SAFETY * finer / (1.0 - exp2(-observed))
     second_order = SAFETY * coarser / (exp2(FORMAL_ORDER) - 1.0) if isfinite(coarser) else 0.0
-    return second_order if order > FORMAL_ORDER else max(CAUTION * finer, second_order)
+    return second_order if observed > FORMAL_ORDER else max(CAUTION * finer, second_order)
 
 
 def contact_error(value: float, more_points: float) -> float:

@@ -381,7 +381,7 @@ def _error_estimate(error: ErrorEstimate) -> dict[str, Any]:
                 "relative_error": quantity.relative,
                 "mesh_error": quantity.mesh,
                 "contact_error": quantity.contact,
-                "order": quantity.order,
+                "order": quantity.observed_order,
                 "coarse": quantity.coarse,
                 "fine": quantity.fine,
                 "more_points": quantity.more_points,

@@ -151,7 +151,7 @@ class Cholesky:
 
     def _solve(self, b: Floats) -> Floats:
         """The solution of U^T U x = b: forwards with U^T, backwards with U."""
-        x = b[self.analysis.order]
+        x = b[self.analysis.permutation]
         with self._libraries.limit(limits=1, user_api="blas"):
             for front, triangle, border in self._dense:
                 own = x[front.first : front.first + front.pivots]
@@ -161,7 +161,7 @@ class Cholesky:
                 own = x[front.first : front.first + front.pivots]
                 own[:] = dtrsv(triangle.T, own - border @ x[front.border], lower=1, trans=1)
         solution = np.empty_like(x)
-        solution[self.analysis.order] = x
+        solution[self.analysis.permutation] = x
         return solution
 
 

@@ -88,12 +88,12 @@ def estimate_error(
 
     Raises `DesignError` as `variants` does.
     """
-    free = next((loading.free for loading in design.loading if loading.name == record.loading), "")
+    free_edges = next((loading.free for loading in design.loading if loading.name == record.loading), "")
     repeats = []
     for words, other in zip(VARIANTS, variants(design), strict=True):
         if say is not None:
             say(f"{record.name}: error estimate, {words}")
-        repeats.append(_repeat(other, mesh, record.configuration, free, solver()))
+        repeats.append(_repeat(other, mesh, record.configuration, free_edges, solver()))
     own = _values(record.outcome)
     rows = zip(_names(design), own, *(repeat.values for repeat in repeats), strict=True)
     elements, points = design.resolution.elements, design.resolution.contact_points
@@ -124,11 +124,11 @@ def estimates(study: Study, solver: Callable[[], LinearSolver]) -> list[Job]:
     return [(record.name, estimate_error, (*arguments, record, solver)) for record in without_estimate(study)]
 
 
-def _repeat(design: Design, mesh: FibrilMesh, state: Configuration, free: str, solver: LinearSolver) -> _Repeat:
+def _repeat(design: Design, mesh: FibrilMesh, state: Configuration, free_edges: str, solver: LinearSolver) -> _Repeat:
     """Relax the state with the numerics of `design`, and measure what comes out."""
     other = build_mesh(design)
     try:
-        found = relax(other, design, transfer(state, mesh, other), free=free, solver=solver)
+        found = relax(other, design, transfer(state, mesh, other), free_edges=free_edges, solver=solver)
     except ConvergenceError as error:
         return _Repeat(np.full(len(_names(design)), nan), nan, str(error))
     back = transfer(found.configuration, other, mesh)

@@ -18,7 +18,7 @@ def parameters(design: Design) -> Markup:
     """The tables of all settings as HTML; the packing where it is not the regular one."""
     yarns = dict.fromkeys(design.weave.warp + design.weave.weft)
     materials = dict.fromkeys(material for yarn in yarns for material in yarn.materials)
-    parts = [
+    tables = [
         _weave(design.weave),
         *(
             _settings(
@@ -39,7 +39,7 @@ def parameters(design: Design) -> Markup:
         _terminals(design),
         _probes(design),
     ]
-    return render("parameters.html", parts=[part for part in parts if part["rows"]])
+    return render("parameters.html", tables=[each for each in tables if each["rows"]])
 
 
 def _weave(weave: Weave) -> dict[str, Any]:

@@ -94,14 +94,14 @@ def table(ensemble: Ensemble) -> str:
 
 def content(ensemble: Ensemble) -> dict[str, Any]:
     """The content of ensemble.json."""
-    parts = percentiles(ensemble.values, BANDS)
+    bands = percentiles(ensemble.values, BANDS)
     states = [
         {
             "name": name,
             "path": ensemble.loadings[s],
             "strain": float(ensemble.strains[s]),
             "count": ensemble.count[s].tolist(),
-            "percentiles": {f"p{percent:g}": plain(part[s]) for percent, part in zip(BANDS, parts, strict=True)},
+            "percentiles": {f"p{percent:g}": plain(band[s]) for percent, band in zip(BANDS, bands, strict=True)},
         }
         for s, name in enumerate(ensemble.states)
     ]

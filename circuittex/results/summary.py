@@ -15,7 +15,7 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
 ``states``
     one object for each recorded state, in the order of computation:
 
-    ``name``, ``path``, ``strain``
+    ``name``, ``loading``, ``strain``
         name of the state, its loading path (empty for the relaxed state), and the strain that labels it
     ``gradient``
         2 x 2 average in-plane deformation gradient from the relaxed state
@@ -308,7 +308,7 @@ def _state(study: Study, record: Record, step: EnergyBalance | None) -> dict[str
     error, check = study.error_of(record.name), study.check_of(record.name)
     return {
         "name": record.name,
-        "path": record.loading,
+        "loading": record.loading,
         "strain": record.strain,
         "gradient": record.gradient,
         "residual_N": record.residual,

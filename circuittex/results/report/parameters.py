@@ -49,7 +49,7 @@ def _weave(weave: Weave) -> dict[str, Any]:
 
 
 def _loading(design: Design) -> dict[str, Any]:
-    head = ["path", "states", "strain", "last average deformation gradient", "ends let go"]
+    head = ["loading", "states", "strain", "last average deformation gradient", "ends let go"]
     rows = [
         [
             loading.name,

@@ -49,7 +49,7 @@ def compare(design: Design, repeats: int) -> list[object]:
     difference = float(abs(tangents["compiled"] - tangents["form"]).max() / abs(tangents["form"]).max())
     times = [1e3 * float(np.median(seconds[name])) for name in ("form", "compiled")]
     quotient = ratio(seconds["form"], seconds["compiled"])
-    return [mesh.order, len(mesh.elements), beam.weight.shape[-1], *times, quotient, difference]
+    return [mesh.order, len(mesh.elements), beam.elements.weight.shape[-1], *times, quotient, difference]
 
 
 def main() -> None:

@@ -164,7 +164,7 @@ def compare(ours: Ours, python: str, repeats: int) -> Table:
             worker.__exit__(None, None, None)
     elements = len(ours.space.mesh.elements)
     title = f"Gradient and tangent of {elements} elements of order {ours.space.mesh.order}, "
-    title += f"{ours.beam.weight.shape[1]} points along and {ours.beam.weight.shape[2]} across each; "
+    title += f"{ours.beam.elements.weight.shape[1]} points along and {ours.beam.elements.weight.shape[2]} across each; "
     title += "one core by the processor's clock, more by the wall's:"
     return Table(title, HEAD, rows)
 

@@ -18,7 +18,7 @@ from measure import Table, arguments, publish
 
 from circuittex.base.arrays import Ints
 from circuittex.geometry.mesh import FibrilMesh
-from circuittex.geometry.order import reordered
+from circuittex.geometry.permutation import permuted
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.mech.multifrontal import MultifrontalSolver
@@ -26,7 +26,7 @@ from circuittex.mech.pardiso import PardisoSolver
 from circuittex.results.bifurcation import current_difference, force_difference
 from circuittex.results.records import Study
 from circuittex.results.store import load_study
-from circuittex.study.branch_check import SEED, another_order
+from circuittex.study.branch_check import SEED, another_permutation
 from circuittex.study.plan import plan
 from circuittex.study.record import outcome_of, reach
 
@@ -58,7 +58,7 @@ def main() -> None:
 
     def tables() -> list[Table]:
         own = np.arange(mesh.n_nodes)
-        other, nodes = reordered(mesh, another_order(mesh.n_fibrils))
+        other, nodes = permuted(mesh, another_permutation(mesh.n_fibrils))
         title = f"{study.design.name}: fibrils shuffled (seed {SEED}), {MultifrontalSolver.name}:"
         made = [Table(title, HEAD, rows(study, other, nodes, MultifrontalSolver))]
         same = {f"{study.design.name}: {name}:": rows(study, mesh, own, SOLVERS[name]) for name in options.solvers}

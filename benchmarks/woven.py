@@ -8,7 +8,7 @@ from circuittex.design import plain_weave
 from circuittex.electrical.network.circuit import Circuit
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
-from circuittex.study.export import detailed_circuit
+from circuittex.study.circuits import state_circuits
 
 
 def woven_circuit(yarns: int, merge_length: float) -> Circuit:
@@ -19,11 +19,7 @@ def woven_circuit(yarns: int, merge_length: float) -> Circuit:
     design = plain_weave(yarns=yarns)
     mesh, numerics = build_mesh(design), design.numerics
     contacts = contact_state(mesh, initial_configuration(mesh), design.contact, per_element=numerics.contact_points)
-    return detailed_circuit(
-        simplify(
-            contacts,
-            merge_length=merge_length,
-            snap_length=design.snap_length,
-            drop_fraction=numerics.drop_fraction,
-        )
+    simple = simplify(
+        contacts, merge_length=merge_length, snap_length=design.snap_length, drop_fraction=numerics.drop_fraction
     )
+    return state_circuits(simple).yarn_ends

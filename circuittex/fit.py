@@ -3,32 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field, replace
-from functools import lru_cache
+from dataclasses import field
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from circuittex.base.arrays import Floats, Ints
-from circuittex.base.binary import power_of_two
 from circuittex.base.errors import CircuitError
 from circuittex.base.frozen import frozen
 from circuittex.design import Design, Probe, Yarn
 from circuittex.electrical.network.circuit import Circuit, reached_part, reduced_circuit, yarn_end_name
 from circuittex.electrical.network.matching import Groups, Match, groups, match_pairs, match_probes, pair_errors, spread
 from circuittex.electrical.network.nodal import solve_nodal
+from circuittex.electrical.network.one_pair import OnePair, checked, fit_one_pair
 from circuittex.electrical.network.ports import PortMatrix
 
-# A conductance below this fraction of that of an insulated yarn is none: it is rounding of the solution.
-_NONE = 1e-12
-# Rc / Ry of the start values, one for each decade, and how far beyond them the search may go.
-_RATIOS = np.logspace(-8.0, 10.0, 19)
-_BEYOND = 10.0
-# A value is called undetermined where a relative error of the weighted currents comes back this many times larger.
-_AMPLIFIED = 100.0
-# A misfit below this fraction of the currents is rounding.
-_EXACT = 1e-15
-POOR = 0.1
+POOR = 0.05
 """A network that misses a current or a resistance by more than this part does not describe the cell: a warning."""
 
 
@@ -71,6 +60,19 @@ class Fit:
     network is not determined."""
 
     @property
+    def segments_by_name(self) -> dict[str, float]:
+        """Ry of each kind of yarn, ohm: by the name 'Ry', or where there are several by those of `network_names`."""
+        return dict(zip(_named("Ry", self.kinds), _values(self.kind_resistance, self.Ry), strict=True))
+
+    @property
+    def crossings_by_name(self) -> dict[str, float]:
+        """Rc of each pair of kinds that cross, ohm: by the name 'Rc', or where there are several by theirs; none where
+        no two yarns that conduct cross."""
+        if self.kinds and not self.pairs:
+            return {}
+        return dict(zip(_named("Rc", self.pairs), _values(self.pair_resistance, self.Rc), strict=True))
+
+    @property
     def known(self) -> bool:
         """Whether the data determine the whole network, so that it can be written down."""
         values = np.concatenate([self.yarns.ravel(), self.crossings.ravel()])
@@ -87,6 +89,34 @@ class Fit:
         return reduced_circuit((n, m), self.yarns, self.crossings)
 
 
+def network_names(design: Design) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the resistances of the reduced networks of a design: those of yarns, and those of crossings.
+
+    >>> from circuittex.design import plain_weave
+    >>> network_names(plain_weave())
+    (('Ry',), ('Rc',))
+    """
+    grouping = groups(design, each_crossing=_method(design) == "all-pairs")
+    pairs = tuple(_conducting_pairs(design, grouping))
+    return _named("Ry", grouping.yarns), _named("Rc", pairs) if pairs or not grouping.yarns else ()
+
+
+def _named(letters: str, kinds: Sequence[str]) -> tuple[str, ...]:
+    return tuple(f"{letters} {kind}" for kind in kinds) if len(kinds) > 1 else (letters,)
+
+
+def _values(by_kind: Floats, one: float) -> list[float]:
+    """Resistances by kind; the one of the network where no kind conducts, or a file of older results has none."""
+    return by_kind.tolist() if len(by_kind) else [one]
+
+
+def _method(design: Design) -> str:
+    """What the design is fitted to: 'probes' or 'all-pairs'."""
+    if design.electrical.fit != "auto":
+        return design.electrical.fit
+    return "probes" if len(groups(design, each_crossing=False).yarns) == 1 else "all-pairs"
+
+
 def fit_network(
     currents: Sequence[float] | Floats, design: Design, matrix: PortMatrix | None = None, *, weighting: str = "relative"
 ) -> Fit:
@@ -101,9 +131,7 @@ def fit_network(
     """
     weave = design.weave
     shape = len(weave.warp), len(weave.weft)
-    method = design.electrical.fit
-    if method == "auto":
-        method = "probes" if len(groups(design, each_crossing=False).yarns) == 1 else "all-pairs"
+    method = _method(design)
     grouping = groups(design, each_crossing=method == "all-pairs")
     currents = np.asarray(currents, dtype=np.float64)
     told = np.isfinite(currents)
@@ -115,7 +143,7 @@ def fit_network(
     else:
         volts = np.array([probe.voltage for probe in design.probes])
         if method == "probes":
-            known = _checked(currents, design, volts) if design.probes else np.empty(0)
+            known = checked(currents, design, volts) if design.probes else np.empty(0)
             match = match_probes(design, grouping, _through_conductors(design, known))
         else:
             match = match_pairs(design, grouping, matrix if matrix is not None else PortMatrix())
@@ -131,16 +159,15 @@ def fit_network(
     if one is None:
         assert match is not None
         one = _of_match(design, match, values, k, best)
-    kinds, q = _kind_pairs(design), grouping.crossing_group
-    per_pair = {name: crossings[where] for name, where in kinds.items() if (q[where] >= 0).any()}
-    warnings = one.warnings
-    if errors[0] > POOR:
-        warnings += (f"the reduced network is off by up to {100 * errors[0]:.2g} % between two yarn ends",)
-    elif one.residual > POOR:
-        warnings += (f"the reduced network misses the currents by up to {100 * one.residual:.2g} %",)
-    return replace(
-        one,
-        warnings=warnings,
+    per_pair = {name: crossings[where] for name, where in _conducting_pairs(design, grouping).items()}
+    return Fit(
+        Ry=one.Ry,
+        Rc=one.Rc,
+        residual=one.residual,
+        covariance=one.covariance,
+        weighting=one.weighting,
+        warnings=one.warnings + _poor(errors[0], one.residual, method == "probes" and crossings.size > 1),
+        currents=one.currents,
         method=method,
         kinds=grouping.yarns,
         kind_resistance=values[:k],
@@ -150,6 +177,16 @@ def fit_network(
         crossings=crossings,
         pair_errors=errors,
     )
+
+
+def _poor(worst: float, residual: float, shared: bool) -> tuple[str, ...]:
+    """What to say of a network that does not describe its cell; `shared`: its crossings have one resistance."""
+    if worst > POOR:
+        way_out = '; with electrical.fit = "all-pairs" each crossing has a resistance of its own' if shared else ""
+        return (f"the reduced network is off by up to {100 * worst:.2g} % between two yarn ends{way_out}",)
+    if residual > POOR:
+        return (f"the reduced network misses the currents by up to {100 * residual:.2g} %",)
+    return ()
 
 
 def _untold(lost: Ints, design: Design, grouping: Groups, weighting: str) -> Fit:
@@ -173,7 +210,7 @@ def _untold(lost: Ints, design: Design, grouping: Groups, weighting: str) -> Fit
     )
 
 
-def _of_match(design: Design, match: Match, values: Floats, k: int, best: Circuit | None) -> Fit:
+def _of_match(design: Design, match: Match, values: Floats, k: int, best: Circuit | None) -> OnePair:
     """A match in one number each: of the yarns where they are of one kind, and the median of the crossings."""
     weave = design.weave
     one_kind = len({yarn.name for yarn in weave.yarns}) == 1
@@ -181,7 +218,7 @@ def _of_match(design: Design, match: Match, values: Floats, k: int, best: Circui
     if best is not None:
         volts = np.array([probe.voltage for probe in design.probes])
         currents = np.array([_through(best, design, probe) for probe in design.probes]) * volts
-    return Fit(
+    return OnePair(
         Ry=float(np.mean(values[:k])) if one_kind and k else float("nan"),
         Rc=float(np.median(values[k:])) if len(values) > k else float("nan"),
         residual=match.misfit,
@@ -213,223 +250,11 @@ def _conducts(yarn: Yarn) -> bool:
     return any(material.electrical_conductivity > 0.0 for material in yarn.materials)
 
 
-def _kind_pairs(design: Design) -> dict[str, tuple[Ints, Ints]]:
-    """Pair of kinds -> the crossings (warp, weft) of it."""
+def _conducting_pairs(design: Design, grouping: Groups) -> dict[str, tuple[Ints, Ints]]:
+    """Pair of kinds that conduct -> the crossings (warp, weft) of it."""
     found: dict[str, list[tuple[int, int]]] = {}
     for i, warp in enumerate(design.weave.warp):
         for j, weft in enumerate(design.weave.weft):
             found.setdefault(" x ".join(sorted([warp.name, weft.name])), []).append((i, j))
-    return {name: (np.array(each)[:, 0], np.array(each)[:, 1]) for name, each in found.items()}
-
-
-def fit_one_pair(currents: Sequence[float] | Floats, design: Design, *, weighting: str = "relative") -> Fit:
-    """Return the Ry and Rc whose reduced network has the probe currents (n,) in A of `design.probes` [47].
-
-    'absolute' minimises Σ (I_network - I)² as [47] is written, 'relative' Σ (I_network / I - 1)². Probes across yarns
-    carry about a hundredth of the current along one yarn, so in the absolute sum the little that the network cannot
-    follow along the yarn outweighs all they say about Rc; relative misfits let every probe speak.
-
-    What does not conduct has the value inf, and what the probes do not tell is nan; `warnings` says so. A probe
-    carries nothing if its conductance is less than 1e-12 of that of an insulated yarn of the design.
-
-    Raises `CircuitError` for currents that are not one finite number for each probe, or that flow backwards.
-    """
-    if weighting not in ("relative", "absolute"):
-        raise CircuitError(f"weighting: {weighting!r} is not usable; it must be 'relative' or 'absolute'")
-    volts = np.array([probe.voltage for probe in design.probes])
-    wanted = _checked(currents, design, volts)
-    carries = wanted > 0.0
-    insulated = network_conductances(design, 1.0, np.inf).sum(axis=1)
-    if not carries.any():
-        return _without_current(insulated, yarn_conductance(design), weighting)
-    size = float(wanted.max())
-    scale: Floats = np.where(carries, wanted, size) if weighting == "relative" else 1.0 / np.abs(volts)
-    if np.array_equal(carries, insulated > 0.0):
-        return _without_contacts(insulated, wanted, scale, volts, weighting)
-    return _with_contacts(design, wanted, scale, volts, weighting)
-
-
-def yarn_conductance(design: Design) -> float:
-    """Return the largest Σ sigma π R² / L of an insulated yarn, with L its straight length across the cell, S.
-
-    >>> from circuittex.design import plain_weave
-    >>> round(yarn_conductance(plain_weave()), 4)
-    0.8836
-    """
-    weave = design.weave
-    crossings = [len(weave.weft)] * len(weave.warp) + [len(weave.warp)] * len(weave.weft)
-    return max(
-        sum(material.electrical_conductivity for material in yarn.materials)
-        * np.pi
-        * yarn.radius
-        * yarn.radius
-        / (count * weave.pitch)
-        for yarn, count in zip(weave.warp + weave.weft, crossings, strict=True)
-    )
-
-
-def network_conductances(design: Design, Ry: float, Rc: float) -> Floats:
-    """Return the conductance of the reduced network at each probe, S, in two shares (n, 2): yarn arms and crossings.
-
-    A share is the power Σ G ΔV² of those resistors over the squared probe voltage. Since the power is stationary in
-    the potential, -share / Ry and -share / Rc are also the exact derivatives of the conductance with Ry and Rc.
-    """
-    ends = {t.name: tuple(yarn_end_name(yarn, side) for yarn, side in t.ends) for t in design.terminals}
-    pairs = tuple((ends[probe.source], ends[probe.sink]) for probe in design.probes)
-    return _conductances((len(design.weave.warp), len(design.weave.weft)), pairs, Ry, Rc)
-
-
-# The start values of the fit are the same for every state, and a misfit and its derivatives follow from one solution.
-@lru_cache(maxsize=100)
-def _conductances(
-    shape: tuple[int, int], pairs: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...], Ry: float, Rc: float
-) -> Floats:
-    """`network_conductances` between the (source, sink) ends of each probe; nobody may write to what it returns."""
-    whole = reduced_circuit(shape, Ry, Rc)
-    shares = []
-    for source, sink in pairs:
-        drive = dict.fromkeys(source, 1.0) | dict.fromkeys(sink, 0.0)
-        part = reached_part(whole, drive)
-        voltage = solve_nodal(part, drive).voltage
-        power = np.diff(voltage[part.resistor_nodes], axis=1)[:, 0] ** 2 / part.resistance
-        crossing = np.array([name.startswith("rc_") for name in part.resistor_names])
-        shares.append((power[~crossing].sum(), power[crossing].sum()))
-    found = np.array(shares, dtype=np.float64).reshape(-1, 2)
-    found.setflags(write=False)
-    return found
-
-
-def _checked(currents: Sequence[float] | Floats, design: Design, volts: Floats) -> Floats:
-    """Return I / U of each probe after looking at it; 0 where it is nothing but rounding."""
-    found = np.asarray(currents, dtype=np.float64)
-    if found.shape != volts.shape or not np.isfinite(found).all():
-        raise CircuitError(
-            f"currents: {found.tolist()} is not usable; it must be one finite number for each of {len(volts)} probes"
-        )
-    conductance: Floats = found / volts
-    nothing = _NONE * yarn_conductance(design)
-    if conductance.min(initial=0.0) < -max(nothing, _NONE * conductance.max(initial=0.0)):
-        raise CircuitError(f"currents: {found.tolist()} is not usable; no current may flow against its voltage")
-    return np.where(conductance > nothing, conductance, 0.0)
-
-
-def _without_current(insulated: Floats, yarns: float, weighting: str) -> Fit:
-    """Say what follows from no current at all: something on the way of every probe does not conduct."""
-    Ry = Rc = float("nan")
-    if not len(insulated):
-        warnings: tuple[str, ...] = ("there are no probes: Ry and Rc are not determined",)
-    elif yarns == 0.0 or insulated.any():
-        Ry = float("inf")
-        warnings = ("no probe carries current: the yarns do not conduct, and Rc is not determined",)
-    else:
-        Rc = float("inf")
-        warnings = ("no probe carries current: the crossings do not conduct, and Ry is not determined",)
-    return Fit(
-        Ry=Ry,
-        Rc=Rc,
-        residual=0.0 if len(insulated) else float("nan"),
-        covariance=np.diag([np.inf, np.inf]),
-        weighting=weighting,
-        warnings=warnings,
-        currents=np.zeros(len(insulated)),
-    )
-
-
-def _without_contacts(insulated: Floats, wanted: Floats, scale: Floats, volts: Floats, weighting: str) -> Fit:
-    """Fit Ry alone, in closed form: only probes along a yarn carry current, so the yarns are insulated."""
-    model, target = insulated / scale, wanted / scale
-    Ry = float(model @ model / (model @ target))
-    misfit = model / Ry - target
-    variance = _variance(misfit) * Ry**2 / float((model / Ry) @ (model / Ry))
-    return Fit(
-        Ry=Ry,
-        Rc=float("inf"),
-        residual=float(np.linalg.norm(misfit)),
-        covariance=np.array([[variance, 0.0], [0.0, np.inf]]),
-        weighting=weighting,
-        warnings=("Rc is not determined: no probe between different yarns carries current",),
-        currents=insulated / Ry * volts,
-    )
-
-
-def _with_contacts(design: Design, wanted: Floats, scale: Floats, volts: Floats, weighting: str) -> Fit:
-    """Fit log Ry and log Rc, from the best of a table of ratios (given Rc / Ry, the best 1 / Ry is linear)."""
-    target = wanted / scale
-    start, best = np.zeros(2), np.inf
-    unit = power_of_two(float(wanted.max()))  # S: logarithms of pure numbers are rounded alike at every scale
-    for ratio in _RATIOS:
-        model = network_conductances(design, 1.0, ratio).sum(axis=1) / scale
-        siemens = float(model @ target / (model @ model))
-        size = float(np.linalg.norm(siemens * model - target))
-        if siemens > 0.0 and size < best:
-            start, best = np.log([unit / siemens, ratio]), size
-
-    # The search is in log Ry and log Rc / Ry: bounds of the ratio keep the network solvable.
-    def values(logs: Floats) -> tuple[float, float]:
-        return float(np.exp(logs[0])) / unit, float(np.exp(logs[0] + logs[1])) / unit
-
-    def misfits(logs: Floats) -> Floats:
-        difference: Floats = network_conductances(design, *values(logs)).sum(axis=1) / scale - target
-        return difference
-
-    def jacobian(logs: Floats) -> Floats:
-        return -network_conductances(design, *values(logs)) @ [[1.0, 0.0], [1.0, 1.0]] / scale[:, None]
-
-    low, high = np.log([_RATIOS[0] / _BEYOND, _RATIOS[-1] * _BEYOND])
-    logs = start
-    if best > _EXACT * float(np.linalg.norm(target)):  # as one probe alone always is; the search would divide by 0
-        logs = least_squares(
-            misfits,
-            start,
-            jacobian,
-            bounds=([-np.inf, low], [np.inf, high]),
-            xtol=1e-15,
-            ftol=None,  # small misfits and slopes do not end the search: Rc may show in nothing but tiny currents
-            gtol=None,
-        ).x
-    misfit = misfits(logs)
-    Ry, Rc = values(logs)
-    shares = network_conductances(design, Ry, Rc)
-    spread, warnings = _spread(-shares / scale[:, None], float(np.abs(target).max()))
-    if not low + 1.0 < logs[1] < high - 1.0:
-        warnings += ("Rc is not determined, at the edge of the search: no crossing resistance explains the currents",)
-    if len(wanted) < 3:
-        warnings += (f"{len(wanted)} probes leave no misfit to judge the fit by: the covariance is unknown",)
-    lost = np.isinf(np.diag(spread)) | (np.sqrt(np.diag(spread)) * float(np.abs(target).max()) > _AMPLIFIED)
-    if not low + 1.0 < logs[1] < high - 1.0:
-        lost[1] = True
-    variance = _variance(misfit)
-    covariance = (
-        variance * spread * np.outer([Ry, Rc], [Ry, Rc]) if np.isfinite(variance) else np.diag([np.inf, np.inf])
-    )
-    return Fit(
-        Ry=float("nan") if lost[0] else Ry,
-        Rc=float("nan") if lost[1] else Rc,
-        residual=float(np.linalg.norm(misfit)),
-        covariance=covariance,
-        weighting=weighting,
-        warnings=warnings,
-        currents=shares.sum(axis=1) * volts,
-    )
-
-
-def _variance(misfit: Floats) -> float:
-    """Return the variance of one misfit, with two degrees of freedom spent on Ry and Rc."""
-    return float(misfit @ misfit) / (len(misfit) - 2) if len(misfit) > 2 else float("inf")
-
-
-def _spread(jacobian: Floats, size: float) -> tuple[Floats, tuple[str, ...]]:
-    """Return (JᵀJ)⁻¹ of the logarithms, inf where J has lost its rank, and what must be said about it."""
-    _, values, directions = np.linalg.svd(jacobian, full_matrices=True)
-    values = np.concatenate([values, np.zeros(2 - len(values))])
-    if values[-1] <= 1e-13 * values[0]:
-        return np.diag([np.inf, np.inf]), (
-            "Ry and Rc are not determined: the probes determine only one combination of them",
-        )
-    spread = (directions.T / values**2) @ directions
-    warnings = tuple(
-        f"{name} is not determined: an error of 1 % in the weighted currents moves it by {percent:.3g} %"
-        for name, percent in zip(("Ry", "Rc"), np.sqrt(np.diag(spread)) * size, strict=True)
-        if percent > _AMPLIFIED
-    )
-    return spread, warnings
+    places = {name: (np.array(each)[:, 0], np.array(each)[:, 1]) for name, each in found.items()}
+    return {name: where for name, where in places.items() if (grouping.crossing_group[where] >= 0).any()}

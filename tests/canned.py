@@ -15,8 +15,11 @@ from circuittex.base.frozen import same
 from circuittex.mech.configuration import Configuration
 from circuittex.relaxation.increment import Increment
 from circuittex.relaxation.relax import Equilibrium
-from circuittex.results.records import Record, Study
+from circuittex.results.records import Study
+from circuittex.study.circuits import state_circuits
+from circuittex.study.export import simplified
 from circuittex.study.plan import Step, plan
+from circuittex.study.record import Recorded
 
 
 def canned_study(states: int = 3, loadings: tuple[str, ...] = ("stretch", "shear")) -> Study:
@@ -52,10 +55,11 @@ class Canned:
         self.reached.append(step.name)
         return increment(self.records[step.name].configuration)
 
-    def record_state(self, study: Study, step: Step, reached: Increment, say: Callable[[str], None]) -> Record:
+    def record_state(self, study: Study, step: Step, reached: Increment, say: Callable[[str], None]) -> Recorded:
         record = self.records[step.name]
         assert same(reached.equilibrium.configuration, record.configuration)
-        return record
+        design = study.design
+        return Recorded(record, state_circuits(simplified(design, record.contacts), design.terminals, design.probes))
 
     def install(self, monkeypatch: pytest.MonkeyPatch) -> Canned:
         """Take the place of the computations and of the report, whose drawing takes long."""

@@ -1,4 +1,6 @@
-"""python check.py results.h5 [LIMIT]: is every crossing on the side that the draft says, how deep do fibrils overlap?
+"""Is every crossing on the side that the draft says, and how deep do fibrils overlap?
+
+    python tests/check_crossings.py results.h5 [LIMIT]
 
 Uses the centre lines and the draft in the file alone, and nothing of circuittex. Exit code 1 where a crossing is on the
 wrong side, or where an overlap R + R' - d exceeds LIMIT (1 unless given) of the smaller radius.
@@ -9,6 +11,7 @@ from itertools import pairwise
 
 import h5py
 import numpy as np
+from plan_view import side
 from scipy.interpolate import CubicSpline
 from scipy.spatial.distance import cdist
 
@@ -25,24 +28,6 @@ def distance(p, q):  # smallest distance of two short polylines
                 t = min(1.0, max(0.0, (w + s * u) @ v / (v @ v)))
             best = min(best, float(np.linalg.norm(w + s * u - t * v)))
     return best
-
-
-def side(warp, weft):
-    """1 where the warp fibril passes over the weft fibril, 0 where under, however they are bent.
-
-    Sum of the signs of all intersections in plan where the warp is above: it changes only where one line is drawn
-    through the other, since the ends are held at the edges of the cell.
-    """
-    a, u = warp[:-1, None], np.diff(warp, axis=0)[:, None]
-    c, v = weft[None, :-1], np.diff(weft, axis=0)[None]
-    w = c - a
-    with np.errstate(divide="ignore", invalid="ignore"):
-        det = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
-        s = (w[..., 0] * v[..., 1] - w[..., 1] * v[..., 0]) / det
-        t = (w[..., 0] * u[..., 1] - w[..., 1] * u[..., 0]) / det
-    hit = (s >= 0) & (s < 1) & (t >= 0) & (t < 1)
-    above = a[..., 2] + s * u[..., 2] > c[..., 2] + t * v[..., 2]
-    return int(np.sum(np.sign(det[hit & above])))
 
 
 def examine(r, first, yarn, radius, draft):

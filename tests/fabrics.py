@@ -13,7 +13,7 @@ from circuittex.base.arrays import Floats, Ints
 from circuittex.contact.penalty import PenaltyContact
 from circuittex.design import ContactLaw, Design, plain_weave
 from circuittex.geometry.mesh import FibrilMesh
-from circuittex.geometry.order import reordered
+from circuittex.geometry.permutation import permuted
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.space import beam_space
@@ -119,14 +119,16 @@ def tangle(
     return fibrils_through(lines, order=order, radius=radius)
 
 
-def renumbered(mesh: FibrilMesh, order: Sequence[int] | Ints, flip: Sequence[int] = ()) -> tuple[FibrilMesh, Ints]:
+def renumbered(
+    mesh: FibrilMesh, permutation: Sequence[int] | Ints, flip: Sequence[int] = ()
+) -> tuple[FibrilMesh, Ints]:
     """The same fibrils in another order, those in `flip` (old numbers) run through backwards.
 
     Returns the mesh and, for each of its nodes, the node's number in the old one. The first director changes sign
     along with the tangent, so that the frames stay right-handed.
     """
-    other, node = reordered(mesh, np.asarray(order))
-    for number, fibril in enumerate(order):
+    other, node = permuted(mesh, np.asarray(permutation))
+    for number, fibril in enumerate(permutation):
         nodes = slice(other.first_node[number], other.first_node[number + 1])
         node[nodes] = node[nodes][:: -1 if fibril in flip else 1]
     directors = mesh.directors[node].copy()

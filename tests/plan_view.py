@@ -9,9 +9,10 @@ Line = NDArray[np.float64]
 
 
 def side(warp: Line, weft: Line) -> int:
-    """1 where the warp fibril passes over the weft fibril, 0 where under, by a check that knows no circuittex.
+    """1 where the warp fibril passes over the weft fibril, 0 where under, however they are bent.
 
-    Sum of the signs of all intersections in plan where the warp is above, from all pairs of segments.
+    Sum of the signs of all intersections in plan where the warp is above, from all pairs of segments: it changes only
+    where one line is drawn through the other, since the ends are held at the edges of the cell.
     """
     a, u = warp[:-1, None], np.diff(warp, axis=0)[:, None]
     c, v = weft[None, :-1], np.diff(weft, axis=0)[None]

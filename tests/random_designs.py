@@ -14,6 +14,7 @@ from collections import Counter
 from math import exp, log
 
 import numpy as np
+from plan_view import side
 
 from circuittex.base.errors import CircuittexError
 from circuittex.design import (
@@ -143,21 +144,8 @@ def _wrong_crossings(study: Study, record: Record) -> int:
     wrong = 0
     for f in np.flatnonzero(mesh.yarn < n):
         for g in np.flatnonzero(mesh.yarn >= n):
-            wrong += _side(lines[f], lines[g]) != study.design.weave.draft[mesh.yarn[f]][mesh.yarn[g] - n]
+            wrong += side(lines[f], lines[g]) != study.design.weave.draft[mesh.yarn[f]][mesh.yarn[g] - n]
     return wrong
-
-
-def _side(warp: np.ndarray, weft: np.ndarray) -> int:
-    a, u = warp[:-1, None], np.diff(warp, axis=0)[:, None]
-    c, v = weft[None, :-1], np.diff(weft, axis=0)[None]
-    w = c - a
-    with np.errstate(divide="ignore", invalid="ignore"):
-        det = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
-        s = (w[..., 0] * v[..., 1] - w[..., 1] * v[..., 0]) / det
-        t = (w[..., 0] * u[..., 1] - w[..., 1] * u[..., 0]) / det
-    hit = (s >= 0) & (s < 1) & (t >= 0) & (t < 1)
-    above = a[..., 2] + s * u[..., 2] > c[..., 2] + t * v[..., 2]
-    return int(np.sum(np.sign(det[hit & above])))
 
 
 def _deepest(record: Record) -> float:

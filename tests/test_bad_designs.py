@@ -24,6 +24,7 @@ Keys = tuple[str | int, ...]
 def changed(*changes: tuple[Keys, Any]) -> dict[str, Any]:
     """The starter design with values replaced, added, or removed (MISSING)."""
     design = copy.deepcopy(tomllib.loads(starter()))
+    design["weave"]["pitch"] = "2 mm"  # that of the lengths in the messages
     for keys, value in changes:
         place: Any = design
         for key in keys[:-1]:

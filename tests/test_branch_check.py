@@ -28,7 +28,7 @@ from circuittex.results.bifurcation import ALLOWED, BranchCheck, Verdict
 from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.records import Record, Study
 from circuittex.results.store import load_study
-from circuittex.study.branch_check import another_order, check_branch
+from circuittex.study.branch_check import another_permutation, check_branch
 from circuittex.study.plan import Step, plan
 from circuittex.study.record import reach
 from circuittex.study.run import run_study
@@ -40,10 +40,10 @@ PRESS = Loading("press", (((1.2, 0.0), (0.0, 1.2)), ((0.8, 0.0), (0.0, 1.2))), (
 
 @pytest.mark.parametrize("n", range(2, 40))
 def test_the_other_order_is_another_one(n: int) -> None:
-    order = another_order(n)
-    assert sorted(order) == list(range(n))
-    assert list(order) != list(range(n))
-    assert np.array_equal(order, another_order(n))
+    permutation = another_permutation(n)
+    assert sorted(permutation) == list(range(n))
+    assert list(permutation) != list(range(n))
+    assert np.array_equal(permutation, another_permutation(n))
 
 
 def test_a_cell_that_keeps_its_branch(tmp_path: Path) -> None:

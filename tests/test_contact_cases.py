@@ -1,4 +1,4 @@
-"""Small scripts that judge by themselves: a fibril between two legs of another, and contacts that lie far apart."""
+"""A small script that judges by itself: a fibril between two legs of another."""
 
 from __future__ import annotations
 
@@ -7,19 +7,11 @@ from pathlib import Path
 
 import pytest
 
-CASES = Path(__file__).parent / "cases"
+HAIRPIN = Path(__file__).parent / "cases" / "hairpin.py"
 
 
-@pytest.mark.parametrize(
-    ("name", "says"),
-    [
-        ("hairpin", ["lower leg 0.2065 N, on the upper 0.2065 N; expected on each 0.2000 N"]),
-        ("merge", ["merged [0.2, 3.6]", "2.396980 ohm, merged 2.396980 ohm, by hand 2.396980 ohm"]),
-    ],
-)
-def test_the_script_ends_well(name: str, says: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_script_ends_well(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
-        runpy.run_path(str(CASES / f"{name}.py"), run_name="__main__")
+        runpy.run_path(str(HAIRPIN), run_name="__main__")
     assert ended.value.code == 0
-    printed = capsys.readouterr().out
-    assert all(text in printed for text in says)
+    assert "lower leg 0.2065 N, on the upper 0.2065 N; expected on each 0.2000 N" in capsys.readouterr().out

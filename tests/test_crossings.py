@@ -113,7 +113,7 @@ def test_a_fibril_that_left_the_end_of_another_is_caught_and_named() -> None:
     r = pushed(mesh, 3, 0.0, 3.0, np.array([4.0, 0.0, 0.0]))
     with pytest.raises(PenetrationError, match=r"do not cross any more: one has slipped off .* \(and 1 other pairs\)"):
         check_sides(mesh, design, r, REST)
-    check_sides(mesh, design, r, REST, free="x")
+    check_sides(mesh, design, r, REST, free_edges="x")
 
 
 # ---- parallel fibrils -------------------------------------------------------------------------------------

@@ -109,7 +109,7 @@ def test_the_starter_is_the_first_example_with_what_follows_from_the_fibrils() -
         electrical=example.electrical,
         numerics=example.numerics,
         contact=example.contact,
-        weave=dataclasses.replace(design.weave, amplitude=example.weave.amplitude),
+        weave=dataclasses.replace(design.weave, amplitude=example.weave.amplitude, pitch=example.weave.pitch),
     )
     assert same(own, example)
 

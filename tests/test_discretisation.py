@@ -92,7 +92,7 @@ def test_degenerate_sequences(values: tuple[float, float, float], error: float) 
 def test_a_quantity_adds_its_parts() -> None:
     quantity = QuantityError("Fx warp", "N", value=-2.0, coarse=-2.3, fine=-1.9, more_points=-1.97)
     assert quantity.regular
-    assert quantity.order == pytest.approx(np.log2(3.0), rel=1e-12)
+    assert quantity.observed_order == pytest.approx(np.log2(3.0), rel=1e-12)
     assert (quantity.mesh, quantity.contact) == pytest.approx((1.25 * 0.15, 0.05), rel=1e-12)
     assert quantity.absolute == pytest.approx(0.2375, rel=1e-12)
     assert quantity.relative == pytest.approx(0.11875, rel=1e-12)

@@ -188,7 +188,10 @@ def test_python(page: str, text: str, folder: Path) -> None:
     assert done.returncode == 0, f"{page}: {done.stderr}"
 
 
-@pytest.mark.parametrize(("page", "text"), shown("toml"))
+PARTS = [(page, text) for page, text in shown("toml") if page != "choosing.md"]  # whole designs: test_choosing.py
+
+
+@pytest.mark.parametrize(("page", "text"), PARTS)
 def test_part_of_a_design(page: str, text: str, small: str, tmp_path: Path) -> None:
     (tmp_path / "part.toml").write_text(f"{small}\n{text}", encoding="utf-8")
     design = load_design(tmp_path / "part.toml")

@@ -14,10 +14,11 @@ from circuittex.design import Design
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import initial_configuration
-from circuittex.mech.dynamics import Rest, affine_velocity, damping_matrix, march, relax_dynamically
+from circuittex.mech.dynamics import Body, Rest, affine_velocity, damping_matrix, march, relax_dynamically
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.scales import fibril_scales
 from circuittex.mech.space import BeamSpace, beam_space
+from circuittex.mech.terms import ForceTerm
 from circuittex.relaxation.relax import clamp_force, force_terms, move, relax
 
 E, RHO, R = 10.0, 1.0, 0.15  # MPa, g/mm3, mm
@@ -25,6 +26,12 @@ RHO_N = 1e-6 * RHO  # N s2/mm4, since 1 N = 1e6 g mm/s2
 GAMMA = 1e-4  # N s/mm4: the paper's 0.1 N s/m for every mm3
 SPAN = 2.0  # mm, the pitch of the cell
 TIGHT = 1e-8  # N, where results are compared to 1e-6 of a clamp force of 0.1 N
+
+
+def body(space: BeamSpace, beam: Beam, *others: ForceTerm, gamma: float) -> Body:
+    """Beams and what else acts on them, with their mass, damped by `gamma`."""
+    scales, damping = fibril_scales(space, SPAN), damping_matrix(space, gamma)
+    return Body([beam, *others], scales, beam.mass, damping, space.fixed)
 
 
 def bar(length: float = 4.0, elements: int = 8) -> tuple[BeamSpace, Beam, Floats]:
@@ -44,13 +51,9 @@ def test_free_flight_coasts_and_drag_slows_it_by_a_known_factor(gamma: float) ->
     instants = list(
         islice(
             march(
-                [beam],
+                body(space, beam, gamma=gamma)._replace(fixed=np.empty(0, dtype=np.int64)),
                 q,
                 velocity.ravel(),
-                scales=fibril_scales(space, SPAN),
-                mass=beam.mass,
-                damping=damping_matrix(space, gamma),
-                fixed=np.empty(0, dtype=np.int64),
                 solver=MultifrontalSolver(),
                 dt=dt,
                 tolerance=1e-12,
@@ -86,13 +89,9 @@ def test_an_axial_wave_has_its_frequency_and_its_numerical_damping(gamma: float)
     start = q.reshape(-1, 9).copy()
     start[:, 0] += amplitude * shape
     states = march(
-        [beam],
+        body(space, beam, gamma=gamma),
         start.ravel(),
         np.zeros_like(q),
-        scales=fibril_scales(space, SPAN),
-        mass=beam.mass,
-        damping=damping_matrix(space, gamma),
-        fixed=space.fixed,
         solver=MultifrontalSolver(),
         dt=dt,
         tolerance=1e-8,
@@ -118,13 +117,9 @@ def test_kinetic_energy_of_a_spinning_fibril_has_the_rotary_term() -> None:
     spin = np.zeros_like(x)
     spin[:, 1:] = np.cross([1.0, 0.0, 0.0], x[:, 1:]) * 100.0
     states = march(
-        [beam],
+        body(space, beam, gamma=0.0),
         q,
         spin.ravel(),
-        scales=fibril_scales(space, SPAN),
-        mass=beam.mass,
-        damping=damping_matrix(space, 0.0),
-        fixed=space.fixed,
         solver=MultifrontalSolver(),
         dt=1e-6,
         tolerance=1e-9,
@@ -143,11 +138,7 @@ def settle(cell: tuple[Design, FibrilMesh], **options: object) -> tuple[BeamSpac
     space, beam, contact = force_terms(mesh, design)
     settings = {"q": space.vector(initial_configuration(mesh)), "dt": 1e-2, "t_relax": 1.0, **options}
     rest = relax_dynamically(
-        [beam, contact],
-        scales=fibril_scales(space, SPAN),
-        mass=beam.mass,
-        damping=damping_matrix(space, GAMMA),
-        fixed=space.fixed,
+        body(space, beam, contact, gamma=GAMMA),
         solver=MultifrontalSolver(),
         tolerance=TIGHT,
         **settings,

@@ -344,7 +344,7 @@ def test_a_study_keeps_the_balance_of_its_equilibria(tmp_path: Path) -> None:
         gradients = [np.eye(2), *map(np.array, loading.gradients)]
         for one, other in pairwise(gradients):
             start = states[-1].configuration
-            found = advance(mesh, design, start, one, other, free=loading.free, solver=MultifrontalSolver())
+            found = advance(mesh, design, start, one, other, free_edges=loading.free, solver=MultifrontalSolver())
             states.append(found.equilibrium)
         whole = clamp_balance(mesh, states)
         names = [record.name for record in study.records if record.loading == loading.name]

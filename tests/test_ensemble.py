@@ -161,7 +161,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
                 clamp_force=rng.standard_normal((2, 3)),
                 currents=tuple(rng.random(len(design.probes))),
                 fields=design.probes,
-                fit=SimpleNamespace(Ry=rng.random(), Rc=rng.random()),
+                outcome=SimpleNamespace(network=tuple(rng.random(2))),
                 verification=SimpleNamespace(routes=()),
             )
             for step in plan(design)

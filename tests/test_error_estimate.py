@@ -129,8 +129,10 @@ def test_the_clamps_are_those_of_the_states_loading(
     design = replace(design, loading=(uniaxial("held", (0.1,)), uniaxial("strip", (0.1,), free="y")))
     seen = []
 
-    def refuse(mesh: FibrilMesh, design: Design, start: Configuration, *, free: str, solver: object) -> Equilibrium:
-        seen.append(free)
+    def refuse(
+        mesh: FibrilMesh, design: Design, start: Configuration, *, free_edges: str, solver: object
+    ) -> Equilibrium:
+        seen.append(free_edges)
         raise ConvergenceError("not wanted")
 
     monkeypatch.setattr(module, "relax", refuse)

@@ -21,7 +21,8 @@ from circuittex.fit import Fit
 from circuittex.mech.configuration import initial_configuration
 from circuittex.relaxation.relax import move
 from circuittex.results.records import Study
-from circuittex.study.export import detailed_circuit, detailed_netlist, probe_netlist, reduced_netlist, simplified
+from circuittex.study.circuits import StateCircuits, state_circuits
+from circuittex.study.export import detailed_netlist, probe_netlist, reduced_netlist, simplified
 from circuittex.study.run import run_study
 
 PAGE = Path(__file__).parents[1] / "docs" / "netlist.md"
@@ -42,6 +43,10 @@ def pressed() -> tuple[Design, ContactState]:
     state = contacts_of(design, mesh, move(initial_configuration(mesh), np.eye(2), np.diag([0.9, 0.9])))
     assert state.n_contacts > 100
     return design, state
+
+
+def built(design: Design, contacts: ContactState) -> StateCircuits:
+    return state_circuits(simplified(design, contacts), design.terminals, design.probes)
 
 
 def blocks(text: str) -> list[str]:
@@ -67,7 +72,7 @@ def test_the_documented_include_runs(finished: tuple[Path, Study]) -> None:
     )
     assert "rror" not in done.stdout + done.stderr
     current = -float(read_raw(where / "bench.raw")[0].current("v1")[0])
-    circuit = detailed_circuit(simplified(study.design, study.records[0].contacts))
+    circuit = built(study.design, study.records[0].contacts).yarn_ends
     drive = {"warp2_minus": 1.0, "warp2_plus": 0.0}
     expected = solve_nodal(circuit, drive).port_current[circuit.ports.index("warp2_minus")]
     assert current == pytest.approx(expected, rel=1e-9)
@@ -77,9 +82,9 @@ def test_the_documented_include_runs(finished: tuple[Path, Study]) -> None:
 def test_sub_circuits_of_a_long_title_differ(pressed: tuple[Design, ContactState]) -> None:
     """A word of a netlist has at most 80 characters, a title 200."""
     design = replace(pressed[0], name="long title " * 15)
-    simple = simplified(design, pressed[1])
+    circuits = built(design, pressed[1])
     states = ("relaxed", "stretch-0.05", "stretch--0.05")
-    names = [subcircuit_name(detailed_netlist(design, state, simple)) for state in states]
+    names = [subcircuit_name(detailed_netlist(design, state, circuits)) for state in states]
     names += [subcircuit_name(reduced_netlist(design, state, FIT)) for state in states]
     assert len(set(names)) == 6
     beginnings = ("relaxed_long", "stretch_0_05_long", "stretch_minus_0_05_long")
@@ -90,7 +95,8 @@ def test_sub_circuits_of_a_long_title_differ(pressed: tuple[Design, ContactState
 def test_the_header_states_how_the_contacts_were_simplified(pressed: tuple[Design, ContactState]) -> None:
     design, contacts = pressed
     design = replace(design, numerics=replace(design.numerics, merge_length=0.25, snap_length=0.05, drop_fraction=0.4))
-    simple = simplified(design, contacts)
+    circuits = built(design, contacts)
+    simple = circuits.simple
     assert min(simple.merged_contacts, simple.merged_feet, simple.dropped_contacts) > 0
     notes = [
         f'* note: "contact points of two fibrils in the same bin of 0.25 mm are one: {simple.merged_contacts} were ',
@@ -98,8 +104,8 @@ def test_the_header_states_how_the_contacts_were_simplified(pressed: tuple[Desig
         f'* note: "contacts below 0.4 of the largest conductance are left out: {simple.dropped_contacts} were"',
     ]
     for text in (
-        detailed_netlist(design, "relaxed", simple),
-        probe_netlist(design, "relaxed", simple, design.probes[0]),
+        detailed_netlist(design, "relaxed", circuits),
+        probe_netlist(design, "relaxed", circuits, design.probes[0]),
     ):
         lines = text.splitlines()
         assert all(any(line.startswith(note) for line in lines) for note in notes)
@@ -108,6 +114,6 @@ def test_the_header_states_how_the_contacts_were_simplified(pressed: tuple[Desig
 def test_the_header_states_that_contacts_were_left_alone(pressed: tuple[Design, ContactState]) -> None:
     design, contacts = pressed
     design = replace(design, numerics=replace(design.numerics, merge_length=0.0, snap_length=0.0))
-    lines = detailed_netlist(design, "relaxed", simplified(design, contacts)).splitlines()
+    lines = detailed_netlist(design, "relaxed", built(design, contacts)).splitlines()
     assert '* note: "contact points are not merged"' in lines
     assert '* note: "feet are not snapped"' in lines

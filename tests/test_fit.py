@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from circuittex.base.errors import CircuitError
 from circuittex.design import Probe, Terminal, plain_weave
-from circuittex.fit import fit_network, network_conductances
+from circuittex.electrical.network.one_pair import network_conductances
+from circuittex.fit import fit_network
 
 DESIGN = plain_weave()
 ENDS = (

@@ -18,6 +18,7 @@ from circuittex.results.plot import FIGURES
 from circuittex.results.store import load_study, write_study_start
 from circuittex.results.summary import write_summary
 from circuittex.results.vtk.vtu import write_collections, write_vtu
+from circuittex.study.circuits import state_circuits
 from circuittex.study.export import simplified, write_netlists
 from circuittex.study.folder import keep_record, open_study
 from circuittex.study.run import run_study
@@ -50,9 +51,10 @@ def used(tmp_path: Path) -> Path:
     (tmp_path / "report.html").write_text("a report", encoding="utf-8")
     for record in study.records:
         write_vtu(tmp_path / "vtu" / f"{record.name}.vtu", study.mesh, record, sides=3)
-        write_netlists(
-            tmp_path / "netlists", study.design, record.name, simplified(study.design, record.contacts), record.fit
+        circuits = state_circuits(
+            simplified(study.design, record.contacts), study.design.terminals, study.design.probes
         )
+        write_netlists(tmp_path / "netlists", study.design, record.name, circuits, record.fit)
     write_collections(tmp_path / "vtu", study.records)
     for figure in FIGURES:  # drawing takes long and has tests of its own
         for kind in ("png", "svg"):

@@ -67,7 +67,7 @@ def pivots(front: Front) -> Ints:
 
 def held(analysis: Analysis) -> NDArray[np.bool_]:
     """Where the fronts have room."""
-    table = np.zeros(2 * (len(analysis.order),), dtype=bool)
+    table = np.zeros(2 * (len(analysis.permutation),), dtype=bool)
     for front in analysis.fronts:
         table[np.ix_(pivots(front), np.append(pivots(front), front.border))] = True
     return np.asarray(np.triu(table))
@@ -79,7 +79,7 @@ def test_unmerged_fronts_hold_the_fill_and_nothing_else(pattern: Pattern) -> Non
     with pytest.MonkeyPatch.context() as patch:
         merge_nothing(patch)
         analysis = analyse(pattern)
-    assert np.array_equal(held(analysis), filled(pattern, analysis.order))
+    assert np.array_equal(held(analysis), filled(pattern, analysis.permutation))
 
 
 @settings(deadline=None, max_examples=60)
@@ -92,7 +92,7 @@ def test_fronts_fit_together(pattern: Pattern, cost: float, share: float) -> Non
         patch.setattr(elimination_tree, "SHARE", share)
         analysis = analyse(pattern)
     n = pattern.n_dofs
-    assert np.array_equal(np.sort(analysis.order), np.arange(n))
+    assert np.array_equal(np.sort(analysis.permutation), np.arange(n))
     assert np.array_equal(np.concatenate([pivots(front) for front in analysis.fronts]), np.arange(n))
     values, at = np.zeros(analysis.size), 0
     values[analysis.target] = np.arange(1, pattern.nnz + 1)
@@ -128,7 +128,7 @@ def test_fronts_fit_together(pattern: Pattern, cost: float, share: float) -> Non
         elif front.below:
             (subtree,) = [subtree for subtree in analysis.subtrees if k in subtree]
             assert subtree.start <= front.below[0]
-    expected = dense(pattern, np.arange(1.0, pattern.nnz + 1))[np.ix_(analysis.order, analysis.order)]
+    expected = dense(pattern, np.arange(1.0, pattern.nnz + 1))[np.ix_(analysis.permutation, analysis.permutation)]
     assert np.array_equal(table + np.triu(table, 1).T, expected)
 
 
@@ -144,7 +144,7 @@ def test_pairs_that_are_not_coupled_are_left_out(pattern: Pattern, seed: int) ->
     smaller = build_pattern(pattern.n_dofs // 9, pairs[coupled & full], pairs[coupled & ~full])
     entries = entries_of(pair_of_entry(pattern), coupled)
     found, expected = some_pairs(pattern, coupled, entries), analyse(smaller)
-    assert np.array_equal(found.order, expected.order)
+    assert np.array_equal(found.permutation, expected.permutation)
     assert np.array_equal(found.target, expected.target)
     assert np.array_equal(pattern.indices[entries], smaller.indices)
 

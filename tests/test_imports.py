@@ -53,7 +53,7 @@ ALLOWED: dict[str, set[str]] = {
         *{"results", "results.store", "results.vtk", "results.plot", "results.report"},
     },
     "study.ensemble": {
-        *{"design", "geometry", "study", "results", "results.store"},
+        *{"design", "geometry", "fit", "study", "results", "results.store"},
         *{"results.plot.style", "results.report.number", "results.report.page", "results.report.template"},
     },
     "study.library": {

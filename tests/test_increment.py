@@ -43,7 +43,7 @@ def follow(cell: Cell, loading: Loading) -> list[Increment]:
     design, mesh, relaxed = cell
     states, now, before = [], relaxed.configuration, REST
     for target in np.array(loading.gradients):
-        states.append(advance(mesh, design, now, before, target, free=loading.free, solver=MultifrontalSolver()))
+        states.append(advance(mesh, design, now, before, target, free_edges=loading.free, solver=MultifrontalSolver()))
         now, before = states[-1].equilibrium.configuration, target
     return states
 
@@ -153,7 +153,7 @@ def test_straight_free_yarns_take_their_natural_length_back(free: str) -> None:
     """Stretched by a tenth both ways and let go along one: 4 mm there, a neo-Hookean pull along the other."""
     design, mesh = straight_cell(elements=4)
     start = initial_configuration(mesh)
-    state = advance(mesh, design, start, REST, 1.1 * REST, free=free, solver=MultifrontalSolver())
+    state = advance(mesh, design, start, REST, 1.1 * REST, free_edges=free, solver=MultifrontalSolver())
     loose, held = (0, 1) if free == "x" else (1, 0)
     equilibrium = state.equilibrium
     assert chords(mesh, equilibrium.configuration.r, loose) == pytest.approx(4.0, abs=1e-6)
@@ -196,8 +196,8 @@ def test_three_crossings_hold_a_free_yarn_crimped() -> None:
 
 def test_what_can_be_free_is_named() -> None:
     design, mesh = straight_cell()
-    with pytest.raises(DesignError, match=r"^free: 'z' .*'x', 'y'"):
-        advance(mesh, design, initial_configuration(mesh), REST, REST, free="z")
+    with pytest.raises(DesignError, match=r"^free_edges: 'z' .*'x', 'y'"):
+        advance(mesh, design, initial_configuration(mesh), REST, REST, free_edges="z")
 
 
 # ---- steps that halve themselves --------------------------------------------------------------------------

@@ -17,14 +17,14 @@ from circuittex.command.cli import main
 from circuittex.command.exit_codes import ExitCode
 from circuittex.electrical.network.ports import PortMatrix, resistances
 from circuittex.results.store import write_study_start
-from circuittex.study.library.accuracy import pair_errors
+from circuittex.study.library.accuracy import compared
 from circuittex.study.library.cell import Cell, Pin
 from circuittex.study.library.export import export_library
 from circuittex.study.library.interpolation import pieces, value, without
 from circuittex.study.library.network import Network, floating, ports_network
 from circuittex.study.library.parts import pins
-from circuittex.study.library.path import branches
 from circuittex.study.library.rating import rated_currents
+from circuittex.study.library.strain_path import branches
 from circuittex.study.library.subcircuit import library_text
 from circuittex.study.library.thinning import thinned
 
@@ -195,10 +195,10 @@ def test_errors_are_those_of_two_resistors() -> None:
     def pair(ohm: float) -> PortMatrix:
         return PortMatrix(("a", "b"), np.array([[1.0, -1.0], [-1.0, 1.0]]) / ohm)
 
-    found = pair_errors([pair(2.0), pair(3.0)], [pair(2.2), pair(3.6)])
+    found = compared([pair(2.0), pair(3.0)], [pair(2.2), pair(3.6)])
     assert found.worst == pytest.approx((0.2, 3.0 / 11.0))
     assert found.median == pytest.approx((0.15, 3.0 / 11.0))
-    still = pair_errors([pair(2.0), pair(2.01)], [pair(2.0), pair(2.5)])
+    still = compared([pair(2.0), pair(2.01)], [pair(2.0), pair(2.5)])
     assert np.isnan(still.worst[1]), "a change of 0.5 % does not count"
 
 

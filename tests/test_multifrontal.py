@@ -155,7 +155,7 @@ def test_one_front_is_the_dense_factor() -> None:
     assert solver.factor(pattern, data) is not None
     assert solver._cholesky is not None
     ((_, triangle, border),) = solver._cholesky._dense
-    order = solver._cholesky.analysis.order
+    order = solver._cholesky.analysis.permutation
     expected = np.linalg.cholesky(dense(pattern, data)[np.ix_(order, order)]).T
     assert np.abs(np.triu(triangle) - expected).max() < 1e-12 * np.abs(expected).max()
     assert border.size == 0

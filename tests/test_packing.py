@@ -85,7 +85,7 @@ def test_it_is_read_with_units() -> None:
         ({"lateral": -0.1}, "packing.lateral", ">= 0 mm"),
         ({"vertical": "1 S"}, "packing.vertical", "in mm"),
         ({"lateral": 0.16}, "packing.lateral", "at most 0.15 mm, the smallest radius"),
-        ({"phase": 0.51}, "packing.phase", "at most 0.5 mm, a quarter of the pitch"),
+        ({"phase": 0.63}, "packing.phase", "at most 0.625 mm, a quarter of the pitch"),
         ({"twist": 0.126}, "packing.twist", "a quarter of a turn a pitch"),
         ({"twsit": 0.1}, "packing.twsit", "did you mean 'twist'"),
         (3, "packing", "must be a table"),

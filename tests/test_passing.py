@@ -12,8 +12,17 @@ from hypothesis import strategies as st
 
 from circuittex.base.arrays import Floats
 from circuittex.base.errors import PenetrationError
-from circuittex.contact.curve import CurveTable, curve_table
-from circuittex.contact.passing import CHORDS, CLOSEST, COLLISION, SafeStep, chords, safe_step, segment_distance
+from circuittex.contact.curve import curve_table
+from circuittex.contact.passing import (
+    CHORDS,
+    CLOSEST,
+    COLLISION,
+    NEIGHBOURS,
+    SafeStep,
+    chords,
+    safe_step,
+    segment_distance,
+)
 from circuittex.design import ContactLaw
 from circuittex.geometry import overlap
 from circuittex.geometry.mesh import FibrilMesh
@@ -40,12 +49,28 @@ def lowered(mesh: FibrilMesh, by: float) -> Floats:
     return (mesh.node_fibril == 1)[:, None] * np.array([0.0, 0.0, -by])
 
 
-def chord_distances(table: CurveTable, r: Floats) -> tuple[Floats, Floats]:
-    """Distances of all chords of different fibrils, by the code that judges starts, and the pairs' fibrils (n, 2)."""
-    points = chords(table, r)
+def curl(gap: float) -> FibrilMesh:
+    """One fibril that goes along x, turns round, and comes back along y, `gap` above itself where it crosses."""
+    turn = np.linspace(-np.pi / 2, np.pi, 25)[1:-1]
+    arc = np.column_stack([1.0 + np.cos(turn), 1.0 + np.sin(turn), gap * (turn / np.pi + 0.5) / 1.5])
+    return fibrils_through(
+        [np.vstack([straight([-1, 0, 0], [1, 0, 0], 10), arc, straight([0, 1, gap], [0, -1, gap], 10)])]
+    )
+
+
+def chord_distances(mesh: FibrilMesh, r: Floats) -> tuple[Floats, Floats]:
+    """Distances of all chords but neighbours, by the code that judges starts, and the pairs' fibrils (n, 2).
+
+    Which of one fibril are neighbours is told by the start, that of the mesh.
+    """
+    table = curve_table(mesh)
+    points, start = chords(table, r), chords(table, mesh.position)
     p, q = points[:, :-1].reshape(-1, 3), points[:, 1:].reshape(-1, 3)
     fibril = np.repeat(table.fibril, CHORDS)
-    i, j = np.nonzero(fibril[:, None] < fibril)
+    behind = np.cumsum(np.linalg.norm(np.diff(start, axis=1), axis=2).ravel())
+    before = np.concatenate([[0.0], behind[:-1]])
+    apart = before[None, :] - behind[:, None] >= NEIGHBOURS * mesh.radius[fibril][:, None]
+    i, j = np.nonzero((fibril[:, None] < fibril) | ((fibril[:, None] == fibril) & apart))
     return overlap.segment_distance(p[i], q[i], p[j], q[j]), np.column_stack([fibril[i], fibril[j]])
 
 
@@ -81,7 +106,7 @@ def test_a_fibril_is_stopped_before_it_falls_through_another(gap: float) -> None
     mesh, way = crossing(gap), 3.0
     found = step(mesh, lowered(mesh, way))
     least = COLLISION * min(gap, 2 * R)
-    assert (gap - (1 + CLOSEST) * least) / way - ROUND_OFF <= found.part <= (gap - least) / way + ROUND_OFF
+    assert (gap - (1 + CLOSEST) * least) / way - ROUND_OFF <= found.fraction <= (gap - least) / way + ROUND_OFF
     assert found.fibrils == (0, 1)
     assert found.distance == pytest.approx(gap, rel=1e-9)
 
@@ -89,8 +114,34 @@ def test_a_fibril_is_stopped_before_it_falls_through_another(gap: float) -> None
 def test_what_ends_just_outside_is_not_limited() -> None:
     gap = 2 * R
     mesh = crossing(gap)
-    assert step(mesh, lowered(mesh, (1 - (1 + CLOSEST) * COLLISION) * gap - 1e-9)).part == 1.0
-    assert step(mesh, lowered(mesh, gap)).part < 1.0
+    assert step(mesh, lowered(mesh, (1 - (1 + CLOSEST) * COLLISION) * gap - 1e-9)).fraction == 1.0
+    assert step(mesh, lowered(mesh, gap)).fraction < 1.0
+
+
+@pytest.mark.parametrize("gap", [0.05, 0.2, 2 * R, 0.5])
+def test_a_fibril_is_stopped_before_it_falls_through_itself(gap: float) -> None:
+    mesh, way = curl(gap), 3.0
+    last = mesh.xi > mesh.length[0] - 1.6  # of the way back, more than half
+    found = step(mesh, last[:, None] * np.array([0.0, 0.0, -way]))
+    least = COLLISION * min(gap, 2 * R)
+    assert (gap - (1 + CLOSEST) * least) / way - ROUND_OFF <= found.fraction <= (gap - least) / way + ROUND_OFF
+    assert found.fibrils == (0, 0)
+    assert found.distance == pytest.approx(gap, rel=1e-9)
+    assert step(mesh, last[:, None] * np.array([0.0, 0.0, way])).fraction == 1.0
+
+
+def test_a_hairpin_may_close_until_its_legs_touch() -> None:
+    """From a bend of radius 2 R to one of R: what is next to the bend is free to fold, and the legs end at 2 R."""
+    legs, bend = np.linspace(0.0, 1.0, 11), np.linspace(0.0, np.pi, 13)[1:-1]
+
+    def pin(radius: float) -> Floats:
+        arc = np.column_stack([1.0 + radius * np.sin(bend), -radius * np.cos(bend), 0.0 * bend])
+        lower, upper = ([[x, y, 0.0] for x in way] for way, y in ((legs, -radius), (legs[::-1], radius)))
+        return np.vstack([lower, arc, upper])
+
+    mesh = fibrils_through([pin(2 * R)])
+    assert step(mesh, pin(R) - mesh.position).fraction == 1.0
+    assert step(mesh, pin(-R) - mesh.position).fraction < 1.0
 
 
 @pytest.mark.parametrize("motion", ["apart", "along", "together", "past the end"])
@@ -104,24 +155,24 @@ def test_harmless_motions_are_not_limited(motion: str) -> None:
         "together": np.full((mesh.n_nodes, 3), 50.0),
         "past the end": upper * np.array([50.0, 0.0, -1.0]),
     }[motion]
-    assert step(mesh, way).part == 1.0
+    assert step(mesh, way).fraction == 1.0
 
 
 def test_parallel_fibrils_of_a_yarn_do_not_pass_either() -> None:
     mesh = fibrils_through([straight([-1, y, 0], [1, y, 0], 6) for y in (0.0, 2 * R)])
     found = step(mesh, (mesh.node_fibril == 1)[:, None] * np.array([0.0, -4 * R, 0.0]))
-    assert found.part == pytest.approx(0.5 * (1 - COLLISION), abs=0.5 * CLOSEST * COLLISION + ROUND_OFF)
+    assert found.fraction == pytest.approx(0.5 * (1 - COLLISION), abs=0.5 * CLOSEST * COLLISION + ROUND_OFF)
 
 
 def test_of_several_collisions_the_first_counts_whatever_the_order() -> None:
     mesh = tangle(11, fibrils=6)
     motion = np.random.default_rng(0).normal(size=(mesh.n_nodes, 3))
     found = step(mesh, motion)
-    assert found.part < 1.0
+    assert found.fraction < 1.0
     order = [4, 2, 0, 5, 1, 3]
     other, node = renumbered(mesh, order)
     again = step(other, motion[node])
-    assert again.part == found.part
+    assert again.fraction == found.fraction
     assert sorted(order[f] for f in again.fibrils) == sorted(found.fibrils)
 
 
@@ -130,7 +181,7 @@ def test_a_scaled_motion_has_the_same_part_to_the_last_bit(power: int) -> None:
     mesh, scale = tangle(12, fibrils=6), 2.0**power
     motion = np.random.default_rng(1).normal(size=(mesh.n_nodes, 3))
     scaled = replace(mesh, position=scale * mesh.position, radius=scale * mesh.radius)
-    assert step(scaled, scale * motion).part == step(mesh, motion).part < 1.0
+    assert step(scaled, scale * motion).fraction == step(mesh, motion).fraction < 1.0
 
 
 # ---- against brute force ----------------------------------------------------------------------------------
@@ -141,17 +192,17 @@ def test_a_scaled_motion_has_the_same_part_to_the_last_bit(power: int) -> None:
 def test_a_safe_part_is_safe_at_every_moment(seed: int, size: float, radius: float) -> None:
     """Looked at in many moments, no two chords are nearer than the collision that they are kept from."""
     mesh = tangle(seed, fibrils=4, elements=4, radius=radius)
-    table, rng = curve_table(mesh), np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     smooth = np.cumsum(rng.normal(size=(mesh.n_nodes, 3)), axis=0) / 3
     motion = size * (rng.normal(size=(mesh.n_fibrils, 3))[mesh.node_fibril] + smooth)
-    part = step(mesh, motion).part
-    first, fibrils = chord_distances(table, mesh.position)
+    part = step(mesh, motion).fraction
+    first, fibrils = chord_distances(mesh, mesh.position)
     least = COLLISION * np.minimum(first, mesh.radius[fibrils].sum(axis=1))
     for t in part * np.linspace(0.0, 1.0, TIMES):
-        now, _ = chord_distances(table, mesh.position + t * motion)
+        now, _ = chord_distances(mesh, mesh.position + t * motion)
         assert (now - least).min() >= -ROUND_OFF
     if part < 1.0:  # and it is a collision that limits it
-        now, _ = chord_distances(table, mesh.position + part * motion)
+        now, _ = chord_distances(mesh, mesh.position + part * motion)
         assert (now - (1 + CLOSEST) * least).min() <= ROUND_OFF
 
 

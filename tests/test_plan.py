@@ -39,7 +39,7 @@ def test_names_stay_plain_where_they_can() -> None:
 def test_every_path_starts_from_the_relaxed_state_and_goes_on_from_its_own() -> None:
     strip, turn = uniaxial("strip", (0.1, 0.2), free="y"), shear("turn", (0.3,))
     steps = plan(plain_weave(loading=(strip, turn)))
-    assert [(step.name, step.previous, step.loading, step.strain, step.free) for step in steps] == [
+    assert [(step.name, step.previous, step.loading, step.strain, step.free_edges) for step in steps] == [
         ("relaxed", "", "", 0.0, ""),
         ("strip-0.1", "relaxed", "strip", 0.1, "y"),
         ("strip-0.2", "strip-0.1", "strip", 0.2, "y"),

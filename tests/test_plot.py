@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from math import nan
 from pathlib import Path
 from xml.etree import ElementTree
@@ -22,7 +23,7 @@ from synthetic_study import INSULATED, synthetic_study
 
 from circuittex.base.arrays import Floats
 from circuittex.geometry.mesh import FibrilMesh
-from circuittex.mech.configuration import initial_configuration
+from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.results.discretisation import ErrorEstimate, QuantityError
 from circuittex.results.loadings import by_loading, farthest, turns
 from circuittex.results.plot import (
@@ -371,3 +372,27 @@ def test_fields_without_any_current() -> None:
         figure = probe_figure(STUDY, (replace(record, fields=silent),), quantity)
         with style():
             figure.draw_without_rendering()
+
+
+def test_pictures_are_drawn_at_any_size() -> None:
+    """A cell a hundred times smaller: arrows, marks and margins shrink with it, and strains stand apart."""
+
+    def shrunk(study: Study, by: float) -> Study:
+        mesh = replace(study.mesh, length=by * study.mesh.length, radius=by * study.mesh.radius)
+        records = []
+        for record in study.records:
+            x = record.configuration.x.copy()
+            x[:, 0] *= by
+            records.append(replace(record, configuration=Configuration(x), strain=by * record.strain))
+        return replace(study, mesh=mesh, records=tuple(records))
+
+    small = shrunk(STUDY, 0.01)
+    for name in ("cell", "currents"):
+        large, little = (FIGURES[name](study).axes[0] for study in (STUDY, small))
+        assert np.ptp(little.get_xlim()) == pytest.approx(0.01 * np.ptp(large.get_xlim()), rel=1e-3)
+    assert "0.01 mm" in [text.get_text() for text in FIGURES["cell"](small).axes[0].texts]
+    figure = conductance_figure(small)
+    figure.canvas.draw()
+    for axes in figure.axes:
+        boxes = [label.get_window_extent() for label in axes.get_xticklabels() if label.get_text()]
+        assert all(left.x1 < right.x0 for left, right in pairwise(boxes))

@@ -36,6 +36,8 @@ def cell(
 
 
 COPPER = cell(120e3, 0.34, 0.025, (1,), 1.0, 0.03)
+LONG_COPPER = cell(120e3, 0.34, 0.025, (1,), 2.0, 0.03)
+COPPER_FILAMENTS = cell(120e3, 0.34, 0.025, (3,), 1.0, 0.03)
 
 
 def values(design: Design, mesh: FibrilMesh, state: Equilibrium) -> Floats:
@@ -53,7 +55,11 @@ def twice(design: Design) -> Design:
     return replace(design, numerics=numerics)
 
 
-@pytest.mark.parametrize("design", [COPPER, replace(plain_weave(yarns=2), numerics=AUTO)], ids=["copper", "paper"])
+@pytest.mark.parametrize(
+    "design",
+    [COPPER, LONG_COPPER, COPPER_FILAMENTS, replace(plain_weave(yarns=2), numerics=AUTO)],
+    ids=["copper", "2 mm", "filaments", "paper"],
+)
 def test_a_mesh_twice_as_fine_changes_little(design: Design) -> None:
     mesh, fine = build_mesh(design), build_mesh(twice(design))
     state = relax(mesh, design)

@@ -10,17 +10,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from beams import rest, rod
+from scipy.optimize import brentq
 
 from circuittex.base.errors import ConvergenceError
 from circuittex.base.frozen import same
 from circuittex.contact.extract import contacts_of
-from circuittex.design import Design, Yarn, load_design, plain_weave
+from circuittex.design import ContactLaw, Design, Material, Numerics, Yarn, load_design, plain_weave
 from circuittex.electrical.fields import solve_probes
 from circuittex.fit import Fit, fit_network
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.mech.space import beam_space
+from circuittex.relaxation.increment import advance
 from circuittex.relaxation.relax import Equilibrium, clamp_force, relax
 
 FOLDER = Path(__file__).parent / "cases"
@@ -202,3 +204,40 @@ def test_a_refusal_for_a_saddle_says_so() -> None:
     start = Configuration(initial_configuration(mesh).x * [[0.9], [1.0], [1.0]])
     with pytest.raises(ConvergenceError, match="the forces balance, but the tangent is not positive definite"):
         rest(Beam(space), start, space.fixed, tolerance=1e-9, max_iterations=0)
+
+
+def test_wires_that_nothing_holds_any_more_are_at_rest() -> None:
+    """Copper pulled straight between wefts whose ends are free: those touch nothing any more, and nothing holds them.
+
+    Round-off of 1e-9 N turned them in every iteration by what stretches them, to second order, with 1e-7 N, far above
+    what counts as nothing there. The warp is a straight wire then: its force is A dpsi/dlambda of [1] at the stretch of
+    its length, the stress across it being zero.
+    """
+    material = Material("copper", 120e3, 0.34, 9e-3, 6e4, 0.4)
+    yarn = Yarn("wire", (1,), 0.025, 0.0525, 0.0525, (material,))
+    design = plain_weave(yarns=2, rows=(1,))
+    design = replace(
+        design,
+        weave=replace(design.weave, warp=(yarn,) * 2, weft=(yarn,) * 2, amplitude=0.03),
+        contact=ContactLaw("hertz", 0.01, 0.1),
+        numerics=Numerics(elements="auto", contact_points="auto"),
+    )
+    mesh = build_mesh(design)
+    now, gradient = relax(mesh, design).configuration, np.eye(2)
+    for strain in (0.005, 0.01, 0.02):
+        pulled = np.diag([1.0 + strain, 1.0])
+        step = advance(mesh, design, now, gradient, pulled, free_edges="y")
+        assert step.parts == 1
+        now, gradient = step.equilibrium.configuration, pulled
+    assert step.iterations <= 20
+    force = clamp_force(mesh, step.equilibrium.reaction)
+    along = 1.02 * 4.0 / mesh.length[0]
+    E, nu = 120e3, 0.34
+    mu, lam = E / (2 * (1 + nu)), E * nu / ((1 + nu) * (1 - 2 * nu))
+
+    def across(width: float) -> float:
+        return float(mu * (width - 1 / width) + lam * np.log(along * width**2) / width)
+
+    width = brentq(across, 0.9, 1.1)
+    stress = mu * (along - 1 / along) + lam * np.log(along * width**2) / along
+    assert force[0, 0] == pytest.approx(2 * pi * 0.025**2 * stress, rel=CLOSE)

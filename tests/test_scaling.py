@@ -163,7 +163,7 @@ def job(design: Design, scale: Scale) -> dict[str, object]:
     there = scaled(design, scale)
     mesh = build_mesh(there)
     rest = relax(mesh, there)
-    pulled = advance(mesh, there, rest.configuration, np.eye(2), np.diag([1.02, 1.0]), free="y").equilibrium
+    pulled = advance(mesh, there, rest.configuration, np.eye(2), np.diag([1.02, 1.0]), free_edges="y").equilibrium
     return {
         f"{key} {state}": value
         for state, found in (("relaxed", rest), ("stretched", pulled))

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from circuittex.base.errors import CircuittexError, ConvergenceError
 from circuittex.base.frozen import same
 from circuittex.mech.multifrontal import MultifrontalSolver
-from circuittex.results.records import Record, Study
+from circuittex.results.records import Study
 from circuittex.study import schedule
 from circuittex.study.plan import plan
+from circuittex.study.record import Recorded
 from circuittex.study.schedule import compute
 
 STUDY = canned_study(4)
@@ -52,7 +53,8 @@ def run(known: list[str], size: int, pick: Callable[[int], int], fails: tuple[st
         if name in fails:
             raise ConvergenceError(f"{name}: no equilibrium", name)
 
-    def keep(study: Study, record: Record) -> Study:
+    def keep(study: Study, recorded: Recorded) -> Study:
+        record = recorded.record
         assert PREVIOUS[record.name] in ("", *kept)
         assert record.contacts.mesh is study.mesh
         kept.append(record.name)

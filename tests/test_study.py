@@ -96,12 +96,19 @@ def test_killed_between_any_two_changes_of_the_disk(
 RUN = """
 import sys
 sys.path.insert(0, sys.argv[1])
+import time
 import circuittex.study.folder
+import circuittex.study.run
 import test_study
 from canned import report
 circuittex.study.folder.write_report = report
-from circuittex.study.run import run_study
-run_study(test_study.cell(), sys.argv[2], workers=int(sys.argv[3]))
+keep = circuittex.study.run.keep_record
+def slowly(*arguments):
+    study = keep(*arguments)
+    time.sleep(0.5)  # for the signal to come before the end, however busy the machine is
+    return study
+circuittex.study.run.keep_record = slowly
+circuittex.study.run.run_study(test_study.cell(), sys.argv[2], workers=int(sys.argv[3]))
 """
 
 

@@ -32,6 +32,17 @@ class ConvergenceError(CircuittexError, RuntimeError):
         super().__init__(message)
 
 
+class CreepingError(ConvergenceError):
+    """A descent whose steps are so short that it would hardly arrive; `q` is where it has come to."""
+
+    def __init__(self, message: str, history: Any, q: Any) -> None:
+        super().__init__(message, history)
+        self.q = q
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (str(self), self.history, self.q)
+
+
 class PenetrationError(ConvergenceError):
     """Fibrils that contact does not keep apart: through one another, or too deep for its law to mean anything."""
 

@@ -145,6 +145,7 @@ def _netlist(options: argparse.Namespace) -> ExitCode:
 
 def _netlist_text(study: Study, record: Record, options: argparse.Namespace) -> str:
     """The netlist that the options ask for."""
+    from circuittex.study.circuits import state_circuits
     from circuittex.study.export import detailed_netlist, probe_netlist, reduced_netlist, simplified
 
     design = study.design
@@ -153,8 +154,10 @@ def _netlist_text(study: Study, record: Record, options: argparse.Namespace) -> 
     length = None if options.resolution == "merged" else 0.0
     simple = simplified(design, record.contacts, merge_length=length)
     if options.kind == "subckt":
-        return detailed_netlist(design, record.name, simple, merge_length=length)
-    return probe_netlist(design, record.name, simple, _probe(design, options.probe), merge_length=length)
+        return detailed_netlist(design, record.name, state_circuits(simple), merge_length=length)
+    probe = _probe(design, options.probe)
+    circuits = state_circuits(simple, design.terminals, [probe])
+    return probe_netlist(design, record.name, circuits, probe, merge_length=length)
 
 
 def _probe(design: Design, name: str | None) -> Probe:

@@ -55,7 +55,7 @@ class Found(NamedTuple):
 class _Scratch(NamedTuple):
     x: Floats
     """(3,) the contact point."""
-    work: Floats
+    place: Floats
     """(3, 3) y, y', y''."""
     weight: Floats
     """(4,) weights of the nodes."""
@@ -177,7 +177,7 @@ def _negative(value: float) -> bool:
 def _record(curve: Any, meeting: Any, s: float, sign: float, scratch: Any, found: Any, count: int) -> int:
     """Keep the place s if it is within reach."""
     k = min(meeting.n - 1, int(s))
-    x, y = scratch.x, scratch.work[0]
+    x, y = scratch.x, scratch.place[0]
     interval = meeting.base + k
     evaluate(curve.basis[curve.kind[interval]], curve.r, curve.window[interval], s - k, 0, scratch.weight, y)
     overlap = meeting.reach - np.sqrt((x[0] - y[0]) ** 2 + (x[1] - y[1]) ** 2 + (x[2] - y[2]) ** 2)
@@ -195,15 +195,15 @@ def _root(curve: Any, meeting: Any, s: float, low: float, high: float, sign: flo
 
     Bisection keeps it between its bounds.
     """
-    x, work, weight, r, k, close = scratch.x, scratch.work, scratch.weight, curve.r, int(low), 1e-14 * meeting.n
+    x, place, weight, r, k, close = scratch.x, scratch.place, scratch.weight, curve.r, int(low), 1e-14 * meeting.n
     basis, window = curve.basis[curve.kind[meeting.base + k]], curve.window[meeting.base + k]
     for _ in range(MAX_STEPS):
-        for order in range(3):
-            evaluate(basis, r, window, s - k, order, weight, work[order])
+        for derivative in range(3):
+            evaluate(basis, r, window, s - k, derivative, weight, place[derivative])
         slope, bend = 0.0, 0.0
         for c in range(3):
-            slope -= (x[c] - work[0, c]) * work[1, c]
-            bend += work[1, c] * work[1, c] - (x[c] - work[0, c]) * work[2, c]
+            slope -= (x[c] - place[0, c]) * place[1, c]
+            bend += place[1, c] * place[1, c] - (x[c] - place[0, c]) * place[2, c]
         slope, bend = sign * slope, sign * bend
         if slope > 0.0:
             high = s

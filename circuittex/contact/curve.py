@@ -81,21 +81,21 @@ def bezier(table: CurveTable, r: Floats) -> Floats:
 
 
 @compiled
-def weights(basis: Any, t: float, order: int, c: Any) -> None:
+def weights(basis: Any, t: float, derivative: int, c: Any) -> None:
     """Fill c (4,) with the weights of the window's nodes at t in [0, 1], or their first or second derivatives."""
     for a in range(4):
         b = basis[a]
-        if order == 0:
+        if derivative == 0:
             c[a] = b[0] + t * (b[1] + t * (b[2] + t * b[3]))
-        elif order == 1:
+        elif derivative == 1:
             c[a] = b[1] + t * (2 * b[2] + t * 3 * b[3])
         else:
             c[a] = 2 * b[2] + 6 * t * b[3]
 
 
 @compiled
-def evaluate(basis: Any, r: Any, window: int, t: float, order: int, c: Any, x: Any) -> None:
+def evaluate(basis: Any, r: Any, window: int, t: float, derivative: int, c: Any, x: Any) -> None:
     """Fill x (3,) with the curve, or its derivative of the given order with respect to t; c (4,) with the weights."""
-    weights(basis, t, order, c)
+    weights(basis, t, derivative, c)
     for k in range(3):
         x[k] = c[0] * r[window, k] + c[1] * r[window + 1, k] + c[2] * r[window + 2, k] + c[3] * r[window + 3, k]

@@ -88,21 +88,21 @@ def _couple(curve: Any, touches: Any, q: int, apart: int, pair: Any) -> tuple[fl
 
     The latter is 0 at a fibril's end; windows with common nodes have `apart` < 4.
     """
-    a, b, r, part = touches.interval_a[q], touches.interval_b[q], curve.r, pair.scratch
-    weights(curve.basis[curve.kind[a]], touches.t_a[q], 0, part[0])
-    for order in range(3):
-        weights(curve.basis[curve.kind[b]], touches.t_b[q], order, part[1 + order])
+    a, b, r, scratch = touches.interval_a[q], touches.interval_b[q], curve.r, pair.scratch
+    weights(curve.basis[curve.kind[a]], touches.t_a[q], 0, scratch[0])
+    for derivative in range(3):
+        weights(curve.basis[curve.kind[b]], touches.t_b[q], derivative, scratch[1 + derivative])
     wa, wb = curve.window[a], curve.window[b]
     square, speed, m = 0.0, 0.0, 0.0
-    u, us = part[4], part[5]
+    u, us = scratch[4], scratch[5]
     for k in range(3):
         u[k], us[k], uss = 0.0, 0.0, 0.0
         for i in range(4):
-            u[k] += part[0, i] * r[wa + i, k]
+            u[k] += scratch[0, i] * r[wa + i, k]
         for i in range(4):
-            u[k] -= part[1, i] * r[wb + i, k]
-            us[k] -= part[2, i] * r[wb + i, k]
-            uss -= part[3, i] * r[wb + i, k]
+            u[k] -= scratch[1, i] * r[wb + i, k]
+            us[k] -= scratch[2, i] * r[wb + i, k]
+            uss -= scratch[3, i] * r[wb + i, k]
         square += u[k] * u[k]
         speed += us[k] * us[k]
         m += us[k] * us[k] + u[k] * uss
@@ -110,10 +110,10 @@ def _couple(curve: Any, touches: Any, q: int, apart: int, pair: Any) -> tuple[fl
     first, second = (0, apart) if wa <= wb else (apart, 0)
     pair.c[:], pair.cs[:] = 0.0, 0.0
     for i in range(4):
-        pair.c[first + i] += part[0, i]
+        pair.c[first + i] += scratch[0, i]
     for i in range(4):
-        pair.c[second + i] -= part[1, i]
-        pair.cs[second + i] -= part[2, i]
+        pair.c[second + i] -= scratch[1, i]
+        pair.cs[second + i] -= scratch[2, i]
     for k in range(3):
         pair.n[k] = u[k] / d
         for i in range(8):

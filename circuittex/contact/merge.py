@@ -60,7 +60,7 @@ def merge_contacts(state: ContactState, length: float) -> ContactState:
     _check_length("merge_length", length)
     if not state.n_contacts:
         return state
-    state = _take(_lower_first(state), _canonical_order(_lower_first(state)))
+    state = _take(_lower_first(state), _canonical_permutation(_lower_first(state)))
     group, start = _together(state, length)
     state = _take(state, np.argsort(group, kind="stable"))
     weight = np.add.reduceat(state.weight, start)
@@ -78,22 +78,22 @@ def merge_contacts(state: ContactState, length: float) -> ContactState:
         conductance=np.add.reduceat(state.conductance, start),
         heat_conductance=np.add.reduceat(state.heat_conductance, start),
     )
-    return _take(merged, _canonical_order(merged))
+    return _take(merged, _canonical_permutation(merged))
 
 
 def _together(state: ContactState, length: float) -> tuple[Ints, Ints]:
     """The group (C,) of each contact, numbered from 0, and where each group starts once they are sorted by it."""
     bin_a, bin_b = np.floor(state.xi_a / length), np.floor(4 * (state.xi_b / length))
-    order = np.lexsort([bin_b, bin_a, state.fibril_b, state.fibril_a])
-    apart = [np.diff(column[order]) != 0 for column in (state.fibril_a, state.fibril_b, bin_a)]
-    bin_b = bin_b[order]
+    permutation = np.lexsort([bin_b, bin_a, state.fibril_b, state.fibril_a])
+    apart = [np.diff(column[permutation]) != 0 for column in (state.fibril_a, state.fibril_b, bin_a)]
+    bin_b = bin_b[permutation]
     step = np.diff(bin_b)
     run_starts = np.concatenate([[True], np.logical_or.reduce([*apart, step > MOST_EMPTY + 1])])
     run, at = np.cumsum(run_starts) - 1, np.flatnonzero(run_starts)
-    bins = bin_b[np.append(at[1:], len(order)) - 1] - bin_b[at] + 1
+    bins = bin_b[np.append(at[1:], len(permutation)) - 1] - bin_b[at] + 1
     own = run_starts | (np.concatenate([[True], step != 0]) & (bins[run] > MOST_BINS))
-    group = np.empty(len(order), dtype=np.int64)
-    group[order] = np.cumsum(own) - 1
+    group = np.empty(len(permutation), dtype=np.int64)
+    group[permutation] = np.cumsum(own) - 1
     return group, np.flatnonzero(own)
 
 
@@ -114,18 +114,18 @@ def snap_feet(state: ContactState, length: float) -> tuple[ContactState, int]:
     fibril = np.concatenate([every, every, state.fibril_a, state.fibril_b])
     xi = np.concatenate([np.zeros(len(L)), L, state.xi_a, state.xi_b])
     area = np.concatenate([np.zeros(2 * len(L)), np.tile(state.width * state.weight, 2)])
-    order = np.lexsort((area, xi, fibril))
-    same_fibril = np.diff(fibril[order]) == 0
-    moved = np.diff(xi[order])
+    permutation = np.lexsort((area, xi, fibril))
+    same_fibril = np.diff(fibril[permutation]) == 0
+    moved = np.diff(xi[permutation])
     start = np.flatnonzero(np.concatenate([[True], ~same_fibril | (moved >= length)]))
-    chain = np.empty(len(order), dtype=np.int64)
-    chain[order] = np.repeat(np.arange(len(start)), np.diff(start, append=len(order)))
-    at = _mean(xi[order], area[order], start)
+    chain = np.empty(len(permutation), dtype=np.int64)
+    chain[permutation] = np.repeat(np.arange(len(start)), np.diff(start, append=len(permutation)))
+    at = _mean(xi[permutation], area[permutation], start)
     low, high = chain[: len(L)], chain[len(L) : 2 * len(L)]
     if np.any(joined := low == high):
         raise DesignError("snap_length", length, f"would join both ends of fibril {int(np.flatnonzero(joined)[0])}")
     at[low], at[high] = 0.0, L
-    distinct = len(order) - int(np.count_nonzero(same_fibril & (moved == 0.0)))
+    distinct = len(permutation) - int(np.count_nonzero(same_fibril & (moved == 0.0)))
     feet = at[chain[2 * len(L) :]]
     n = state.n_contacts
     return replace(state, xi_a=feet[:n], xi_b=feet[n:]), distinct - len(start)
@@ -174,10 +174,10 @@ def _lower_first(state: ContactState) -> ContactState:
     )
 
 
-def _canonical_order(state: ContactState) -> Ints:
+def _canonical_permutation(state: ContactState) -> Ints:
     """The order by pair and coordinate, ties broken by all other values, so that sums round the same way."""
-    order: Ints = np.lexsort([getattr(state, name) for name in reversed(_ROWS)])
-    return order
+    permutation: Ints = np.lexsort([getattr(state, name) for name in reversed(_ROWS)])
+    return permutation
 
 
 def _mean(values: Floats, measure: Floats, start: Ints) -> Floats:

@@ -1,4 +1,4 @@
-"""How far a motion may go before two fibrils pass through one another: continuous collision detection of centre lines.
+"""How far a motion may go before fibrils pass through one another: continuous collision detection of centre lines.
 
 Contact sees where fibrils overlap at the end of a step and nothing of the way there. Here the centre lines are taken
 as `CHORDS` chords of each interval of the contact curve, whose points move on straight lines while q goes to
@@ -7,7 +7,8 @@ chords move against one another: with L the largest of those relative motions, d
 bound (conservative advancement: Mirtich, PhD thesis, Berkeley 1996) never leaps over a collision.
 
 Two chords *collide* when their distance falls below `COLLISION` of the one they had, or of R + R' where they started
-further apart than touch. A motion without collision is not limited at all.
+further apart than touch. A motion without collision is not limited at all. The same holds for two chords of one
+fibril, unless they are neighbours along it.
 """
 
 from __future__ import annotations
@@ -30,6 +31,9 @@ COLLISION = 1 / 4
 """Part of the first distance, or of R + R' if that is less, at which two centre lines count as having met. It leaves
 room for the line search, which goes by energies, to come back."""
 _WEIGHTS = np.einsum("kap,tp->kta", BASIS, np.linspace(0.0, 1.0, CHORDS + 1)[:, None] ** np.arange(4))
+NEIGHBOURS = np.pi
+"""Parts of R along a fibril from one of its chords to another below which they are neighbours, free to bend against one
+another: the way round a hairpin whose legs touch."""
 CLOSEST = 1 / 8
 """How close the advancement comes to the collision, in parts of it: it would never end at the place itself."""
 MOST_ADVANCES = 200
@@ -43,12 +47,13 @@ PRESSED = 1 / 50
 
 @frozen
 class SafeStep:
-    """The part of a motion that is safe, and the pair of fibrils that limits it."""
+    """The fraction of a motion that is safe, and the pair of fibrils that limits it."""
 
-    part: float
-    """From 0 to 1; 1: no two fibrils collide."""
+    fraction: float
+    """From 0 to 1; 1: nothing collides."""
     fibrils: tuple[int, int]
-    """The pair that limits it, the lower number first; meaningless where `part` is 1."""
+    """The pair that limits it, the lower number first, or twice the one that collides with itself; meaningless where
+    `fraction` is 1."""
     distance: float
     """The distance at the start of the chords of that pair that collide, mm."""
 
@@ -76,7 +81,9 @@ def _evaluate(weights: Any, kind: Any, window: Any, r: Any, points: Any) -> None
 
 
 def safe_step(table: CurveTable, radius: Floats, r: Floats, motion: Floats) -> SafeStep:
-    """How much of `motion` (N, 3) the nodes r (N, 3) can make before two different fibrils collide; radius (F,), mm.
+    """How much of `motion` (N, 3) the nodes r (N, 3) can make before two fibrils, or a fibril and itself, collide.
+
+    radius (F,), mm.
 
     The order of the fibrils does not matter: every pair is followed to the end.
 
@@ -85,9 +92,9 @@ def safe_step(table: CurveTable, radius: Floats, r: Floats, motion: Floats) -> S
     >>> r = np.vstack([t * [1.0, 0.0, 0.0], t * [0.0, 1.0, 0.0] + [0.0, 0.0, 0.5]])
     >>> table = CurveTable(np.array([0, 3, 6]), np.repeat([0, 1], 3), np.repeat([0, 4], 3), np.array([0, 1, 2] * 2))
     >>> down = np.repeat([[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]], 4, axis=0)
-    >>> safe_step(table, np.array([0.3, 0.3]), r, down).part  # from 0.5 to a quarter of it
+    >>> safe_step(table, np.array([0.3, 0.3]), r, down).fraction  # from 0.5 to a quarter of it
     0.375
-    >>> safe_step(table, np.array([0.3, 0.3]), r, -down).part
+    >>> safe_step(table, np.array([0.3, 0.3]), r, -down).fraction
     1.0
     """
     start, way = chords(table, r), chords(table, motion)
@@ -96,11 +103,11 @@ def safe_step(table: CurveTable, radius: Floats, r: Floats, motion: Floats) -> S
     low = np.minimum(start, end).min(axis=1) - reach
     high = np.maximum(start, end).max(axis=1) + reach
     axis = int(np.argmax(np.ptp(low, axis=0)))
-    order = np.argsort(low[:, axis], kind="stable")
+    rising = np.argsort(low[:, axis], kind="stable")
     turned = np.roll(np.arange(3), -axis)  # the axis of the sweep first
-    low, high = (np.ascontiguousarray(box[order][:, turned]) for box in (low, high))
+    low, high = (np.ascontiguousarray(box[rising][:, turned]) for box in (low, high))
     found = np.array([1.0, 0.0, 0.0, np.inf])
-    _sweep(order, low, high, table.fibril, radius, start, way, found)
+    _sweep(rising, low, high, table.fibril, radius, start, way, _along(table.fibril, start), found)
     pair = sorted(found[1:3].astype(int).tolist())
     return SafeStep(float(found[0]), (pair[0], pair[1]), float(found[3]))
 
@@ -117,6 +124,20 @@ def likely_cause(mesh: FibrilMesh, law: ContactLaw, first: int, second: int) -> 
             'which penalty = "hertz" asks for'
         )
     return "they are pressed together further than contact can hold: load them less, or in smaller steps"
+
+
+@compiled
+def _along(fibril: Any, start: Any) -> Any:
+    """(I, CHORDS + 1) the way along each fibril from its beginning to the points between its chords."""
+    along = np.zeros(start.shape[:2])
+    for i in range(start.shape[0]):
+        if i > 0 and fibril[i] == fibril[i - 1]:
+            along[i, 0] = along[i - 1, -1]
+        for a in range(1, start.shape[1]):
+            p, q = start[i, a - 1], start[i, a]
+            length = np.sqrt((q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2 + (q[2] - p[2]) ** 2)
+            along[i, a] = along[i, a - 1] + length
+    return along
 
 
 @compiled
@@ -150,13 +171,13 @@ def segment_distance(p: Any, q: Any, r: Any, s: Any) -> float:
 
 
 @compiled
-def _distance_at(t: float, p: Any, u: Any, q: Any, v: Any, work: Any) -> float:
-    """Distance of chords p and q (2, 3) after the part t of their motions u and v; work (4, 3)."""
+def _distance_at(t: float, p: Any, u: Any, q: Any, v: Any, scratch: Any) -> float:
+    """Distance of chords p and q (2, 3) after the part t of their motions u and v; scratch (4, 3)."""
     for e in range(2):
         for k in range(3):
-            work[e, k] = p[e, k] + t * u[e, k]
-            work[2 + e, k] = q[e, k] + t * v[e, k]
-    return segment_distance(work[0], work[1], work[2], work[3])
+            scratch[e, k] = p[e, k] + t * u[e, k]
+            scratch[2 + e, k] = q[e, k] + t * v[e, k]
+    return segment_distance(scratch[0], scratch[1], scratch[2], scratch[3])
 
 
 @compiled
@@ -170,9 +191,9 @@ def _relative_motion(u: Any, v: Any) -> float:
 
 
 @compiled
-def _safe_part(p: Any, u: Any, q: Any, v: Any, touch: float, work: Any, first: Any) -> float:
+def _safe_fraction(p: Any, u: Any, q: Any, v: Any, touch: float, scratch: Any, first: Any) -> float:
     """The safe part of the motion of two chords (`safe_step`); first (1,) receives their distance at its start."""
-    d = _distance_at(0.0, p, u, q, v, work)
+    d = _distance_at(0.0, p, u, q, v, scratch)
     first[0] = d
     scale, fastest = min(d, touch), _relative_motion(u, v)
     if fastest == 0.0 or d - fastest > COLLISION * scale:
@@ -182,39 +203,46 @@ def _safe_part(p: Any, u: Any, q: Any, v: Any, touch: float, work: Any, first: A
         t += (d - COLLISION * scale) / fastest
         if t >= 1.0:
             return 1.0
-        d = _distance_at(t, p, u, q, v, work)
+        d = _distance_at(t, p, u, q, v, scratch)
         if d <= (1.0 + CLOSEST) * COLLISION * scale:
             break
     return t
 
 
 @compiled
-def _sweep(order: Any, low: Any, high: Any, fibril: Any, radius: Any, start: Any, way: Any, found: Any) -> None:
-    """The least safe part of all pairs of chords of different fibrils, with the pair and its distance, in found (4,).
+def _sweep(
+    rising: Any, low: Any, high: Any, fibril: Any, radius: Any, start: Any, way: Any, along: Any, found: Any
+) -> None:
+    """The least safe part of all pairs of chords but neighbours, with the pair and its distance, in found (4,).
 
-    order (I,): the intervals by the lower end along the first axis of the boxes that they sweep; these boxes low, high
-    (I, 3) stand in that order.
+    rising (I,): the intervals by the lower end along the first axis of the boxes that they sweep; these boxes low, high
+    (I, 3) stand in that order; along (I, CHORDS + 1) as `_along`.
     """
-    work, first = np.empty((4, 3)), np.empty(1)
-    for n in range(order.shape[0]):
-        i = order[n]
+    scratch, first = np.empty((4, 3)), np.empty(1)
+    for n in range(rising.shape[0]):
+        i = rising[n]
         f, ends, x, y, z, w = fibril[i], high[n, 0], low[n, 1], high[n, 1], low[n, 2], high[n, 2]
-        for m in range(n + 1, order.shape[0]):
+        for m in range(n + 1, rising.shape[0]):
             if low[m, 0] > ends:
                 break
-            if low[m, 1] > y or high[m, 1] < x or low[m, 2] > w or high[m, 2] < z or fibril[order[m]] == f:
+            if low[m, 1] > y or high[m, 1] < x or low[m, 2] > w or high[m, 2] < z:
                 continue
-            j = order[m]
+            j = rising[m]
+            own, near = fibril[j] == f, NEIGHBOURS * radius[f]
+            if own and max(along[j, -1] - along[i, 0], along[i, -1] - along[j, 0]) < near:
+                continue
             touch = radius[f] + radius[fibril[j]]
             for a in range(start.shape[1] - 1):
                 for b in range(start.shape[1] - 1):
                     p, u = start[i, a : a + 2], way[i, a : a + 2]
                     q, v = start[j, b : b + 2], way[j, b : b + 2]
+                    if own and max(along[j, b] - along[i, a + 1], along[i, a] - along[j, b + 1]) < near:
+                        continue
                     if not _may_meet(p, u, q, v, COLLISION * touch):
                         continue
-                    part = _safe_part(p, u, q, v, touch, work, first)
-                    if part < found[0]:
-                        found[0], found[1], found[2], found[3] = part, f, fibril[j], first[0]
+                    fraction = _safe_fraction(p, u, q, v, touch, scratch, first)
+                    if fraction < found[0]:
+                        found[0], found[1], found[2], found[3] = fraction, f, fibril[j], first[0]
 
 
 @compiled

@@ -73,11 +73,14 @@ class PenaltyContact:
     that the energy stays smooth where minima appear, merge and vanish.
 
     `law` gives P* of each pair (`pair_penalty`), `per_element` is the number of contact points of an element, `skin`
-    (mm) how far candidates reach beyond touch so that they last several iterations, by default `SKIN`.
+    (mm) how far candidates reach beyond touch so that they last several iterations, by default `SKIN`; `part` of the
+    penalty is what counts.
     """
 
-    def __init__(self, mesh: FibrilMesh, *, law: ContactLaw, per_element: int, skin: float | None = None) -> None:
-        self.mesh, self.law = mesh, law
+    def __init__(
+        self, mesh: FibrilMesh, *, law: ContactLaw, per_element: int, skin: float | None = None, part: float = 1.0
+    ) -> None:
+        self.mesh, self.law, self.part = mesh, law, part
         self.skin = SKIN * float(mesh.radius.min()) if skin is None else skin
         self.table: CurveTable = curve_table(mesh)
         self.points = contact_points(mesh, per_element)
@@ -164,7 +167,8 @@ class PenaltyContact:
     def _stiffness(self, found: Touching) -> Floats:
         """(C,) P* w of each contact point, N/mm; negative at a maximum of the distance."""
         a = self.table.fibril[found.interval_a]
-        return np.asarray(found.sign * pair_penalty(self.mesh, self.law, a, found.fibril_b) * self.weight[a])
+        penalty = self.part * pair_penalty(self.mesh, self.law, a, found.fibril_b)
+        return np.asarray(found.sign * penalty * self.weight[a])
 
     def longest(self, q: Floats, direction: Floats) -> float:
         """The part of `direction` that the centre lines can go without colliding (`safe_step`).
@@ -173,10 +177,10 @@ class PenaltyContact:
         """
         mesh = self.mesh
         step = safe_step(self.table, mesh.radius, self.positions(q), self.positions(direction))
-        if step.part < 1.0 and step.distance < PRESSED * mesh.radius[list(step.fibrils)].sum():
+        if step.fraction < 1.0 and step.distance < PRESSED * mesh.radius[list(step.fibrils)].sum():
             what = f"{pair_label(mesh, *step.fibrils)} are pressed through one another"
             raise PenetrationError(f"{what}; {likely_cause(mesh, self.law, *step.fibrils)}")
-        return step.part
+        return step.fraction
 
     def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
         """Add gradient and tangent in place, the turning of the contact force to `softening`; return the energy."""
@@ -204,6 +208,6 @@ class PenaltyContact:
         pieces = min(cores(), 1 + len(window_a) // WORTH_A_THREAD)
         # The rows of the lower window hold the blocks of both, those of the higher only its own.
         low, high = np.minimum(window_a, window_b), np.maximum(window_a, window_b)
-        work = np.cumsum(3 * np.bincount(low, minlength=n) + np.bincount(high, minlength=n))
-        inner = np.searchsorted(work, work[-1] * np.arange(1, pieces) / pieces) + 1
+        cost = np.cumsum(3 * np.bincount(low, minlength=n) + np.bincount(high, minlength=n))
+        inner = np.searchsorted(cost, cost[-1] * np.arange(1, pieces) / pieces) + 1
         return [0, *np.minimum(inner, n).tolist(), n]

@@ -52,8 +52,8 @@ def find_candidates(table: CurveTable, r: Floats, radius: Floats, skin: float) -
     near = (apart**2).sum(axis=1) <= (thick[i] + thick[j]) ** 2
     itself = np.arange(len(hull))
     i, j = np.concatenate([i[near], j[near], itself]), np.concatenate([j[near], i[near], itself])
-    order = np.lexsort((j, i))
-    i, j = i[order], j[order]
+    permutation = np.lexsort((j, i))
+    i, j = i[permutation], j[permutation]
     fibril = table.fibril[j]
     start = np.flatnonzero(
         (np.diff(i, prepend=-1) != 0) | (np.diff(j, prepend=-2) != 1) | (np.diff(fibril, prepend=0) != 0)

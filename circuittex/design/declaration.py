@@ -31,7 +31,7 @@ class Key:
     """How the value of a field is read, checked and explained."""
 
     check: Check
-    """(value, dotted path) -> the value, or `DesignError`."""
+    """(value, dotted name) -> the value, or `DesignError`."""
     read: Check
     """The same for a value from a file, before `check`: units become numbers."""
     wanted: str
@@ -61,13 +61,13 @@ def number(
     """
     shown_unit = "" if unit == "1" else unit
 
-    def check(value: object, path: str) -> object:
+    def check(value: object, field: str) -> object:
         if isinstance(value, str) and words:
-            return one_of(value, path, words)
-        return real(value, path, shown_unit, above=above, at_least=at_least, at_most=at_most)
+            return one_of(value, field, words)
+        return real(value, field, shown_unit, above=above, at_least=at_least, at_most=at_most)
 
-    def read(value: object, path: str) -> object:
-        return value if isinstance(value, str) and value in words else quantity(value, unit, path)
+    def read(value: object, field: str) -> object:
+        return value if isinstance(value, str) and value in words else quantity(value, unit, field)
 
     wanted = "a plain number" if unit == "1" else f"a number in {unit} or a string with a unit"
     limits = [f"> {above:g}"] * (above > -inf) + [f">= {at_least:g}"] * (at_least > -inf)
@@ -84,13 +84,13 @@ def relative(unit: str, note: str, *, shown: str, at_most: float) -> Mapping[str
     '0.002 N'
     """
 
-    def check(value: object, path: str) -> object:
+    def check(value: object, field: str) -> object:
         if isinstance(value, str):  # of any size: what it is compared with may be as small
-            size = quantity(value, unit, path)
+            size = quantity(value, unit, field)
             if not size > 0.0:
-                raise refuse(path, value, f"it must be > 0 {unit}")
+                raise refuse(field, value, f"it must be > 0 {unit}")
             return f"{size!r} {unit}"
-        return real(value, path, f"or a text in {unit}", above=0, at_most=at_most)
+        return real(value, field, f"or a text in {unit}", above=0, at_most=at_most)
 
     wanted = f"a plain number or a string in {unit}"
     return _metadata(check, _as_it_is, wanted, f"> 0 and <= {at_most:g}, or > 0 {unit}", shown, note)
@@ -103,10 +103,10 @@ def count(note: str, at_least: int, at_most: int, *, shown: str, words: tuple[st
     20
     """
 
-    def check(value: object, path: str) -> object:
+    def check(value: object, field: str) -> object:
         if isinstance(value, str) and words:
-            return one_of(value, path, words)
-        return whole(value, path, at_least, at_most)
+            return one_of(value, field, words)
+        return whole(value, field, at_least, at_most)
 
     allowed = ", ".join([*(f'"{word}"' for word in words), f"{at_least} to {at_most}"])
     text = shown if _is_plain(shown) else f'"{shown}"'
@@ -120,7 +120,9 @@ def choice(note: str, choices: tuple[str, ...], *, shown: str) -> Mapping[str, K
     '"reference", "current"'
     """
     allowed = ", ".join(f'"{word}"' for word in choices)
-    return _metadata(lambda value, path: one_of(value, path, choices), _as_it_is, allowed, allowed, f'"{shown}"', note)
+    return _metadata(
+        lambda value, field: one_of(value, field, choices), _as_it_is, allowed, allowed, f'"{shown}"', note
+    )
 
 
 def flag(note: str, *, shown: bool) -> Mapping[str, Key]:
@@ -143,7 +145,7 @@ def keys(kind: type) -> dict[str, Key]:
 
 
 def check(target: Any, at: str) -> None:
-    """Check every declared field of a dataclass that is being made at the dotted path `at`.
+    """Check every declared field of a dataclass that is being made at the dotted name `at`.
 
     Raises `DesignError` for the first that is not usable.
     """
@@ -202,7 +204,7 @@ def _metadata(read_check: Check, read_value: Check, wanted: str, allowed: str, s
     return {_KEY: Key(read_check, read_value, wanted, allowed, shown, note)}
 
 
-def _as_it_is(value: object, path: str) -> object:
+def _as_it_is(value: object, field: str) -> object:
     return value
 
 

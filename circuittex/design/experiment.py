@@ -48,7 +48,7 @@ class Loading:
             gradients=tuple(check_gradient(F, f"{at}.gradients[{i}]") for i, F in enumerate(self.gradients)),
             strains=tuple(real(e, f"{at}.strains[{i}]") for i, e in enumerate(self.strains)),
         )
-        check_free(self.free, self.gradients, f"{at}.free")
+        check_free_edges(self.free, self.gradients, f"{at}.free")
 
 
 def uniaxial(name: str, strains: Sequence[float], axis: str = "x", free: str = "") -> Loading:
@@ -100,10 +100,10 @@ def equal_steps(strain: float, steps: int) -> tuple[float, ...]:
     return tuple(float(exact * i / steps) for i in range(1, steps + 1))
 
 
-def check_free(free: str, gradients: Sequence[Gradient], field: str) -> None:
+def check_free_edges(free: str, gradients: Sequence[Gradient], field: str) -> None:
     """Refuse to free the edges that a loading is about: what is left held must be moved, or nothing moved at all.
 
-    >>> check_free("y", uniaxial("strip", (0.1,)).gradients, "loading.strip.free")
+    >>> check_free_edges("y", uniaxial("strip", (0.1,)).gradients, "loading.strip.free")
     """
     if not one_of(free, field, ("", "x", "y")) or all(F == REST for F in gradients):
         return

@@ -129,7 +129,7 @@ class Weave:
     weft: tuple[Yarn, ...]
     """The kind of each weft yarn."""
     pitch: float = field(
-        metadata=number("mm", "between neighbouring yarn axes, in both directions", shown="2 mm", above=0)
+        metadata=number("mm", "between neighbouring yarn axes, in both directions", shown="2.5 mm", above=0)
     )
     """Distance of neighbouring yarn axes in both directions, mm."""
     amplitude: float = field(

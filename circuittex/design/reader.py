@@ -66,14 +66,14 @@ def read_design(mapping: object) -> Design:
         raise refuse("format", version, f"this version reads format = {FORMAT}")
     title = top.text("name", "a title for the design")
     materials = _named(top, "materials", _material)
-    yarns = _named(top, "yarns", lambda value, path, label: _yarn(value, path, label, materials))
+    yarns = _named(top, "yarns", lambda value, field, label: _yarn(value, field, label, materials))
     return Design(
         name=title,
         weave=_weave(top.get("weave", "a table [weave]"), yarns),
         contact=_contact(top.get("contact", "a table [contact]")),
-        loading=tuple(_loading(value, path) for value, path in _entries(top, "loading")),
+        loading=tuple(_loading(value, field) for value, field in _entries(top, "loading")),
         terminals=tuple(_named(top, "terminals", _terminal, optional=True).values()),
-        probes=tuple(_probe(value, path) for value, path in _entries(top, "probes")),
+        probes=tuple(_probe(value, field) for value, field in _entries(top, "probes")),
         electrical=Electrical(**read(Electrical, Table(top.value.get("electrical", {}), "electrical"))),
         numerics=Numerics(**read(Numerics, Table(top.value.get("numerics", {}), "numerics"))),
         packing=Packing(**read(Packing, Table(top.value.get("packing", {}), "packing"))),
@@ -91,7 +91,7 @@ def _named(top: Table, key: str, read: Callable[[object, str, str], _T], *, opti
 
 
 def _entries(top: Table, key: str) -> Iterator[tuple[object, str]]:
-    """The entries of an array of tables, `[[key]]`, with the best path there is for each."""
+    """The entries of an array of tables, `[[key]]`, with the best name there is for each."""
     if not top.has(key):
         return
     for i, value in enumerate(top.items(key, f"tables [[{key}]]")):
@@ -99,14 +99,14 @@ def _entries(top: Table, key: str) -> Iterator[tuple[object, str]]:
         yield value, f"{key}.{label}" if isinstance(label, str) and is_name(label) else f"{key}[{i}]"
 
 
-def _material(value: object, path: str, label: str) -> Material:
-    return Material(label, **read(Material, Table(value, path)))
+def _material(value: object, field: str, label: str) -> Material:
+    return Material(label, **read(Material, Table(value, field)))
 
 
-def _yarn(value: object, path: str, label: str, materials: Mapping[str, Material]) -> Yarn:
+def _yarn(value: object, field: str, label: str, materials: Mapping[str, Material]) -> Yarn:
     if isinstance(value, Mapping) and "spacing" in value:
         value = {"row_spacing": value["spacing"], **value}
-    table = Table(value, path)
+    table = Table(value, field)
     table.only(("rows", *keys(Yarn), "material", "materials"))
     rows = check_rows(table.get("rows", "the number of fibrils in each row, such as [3, 4, 3]"), table.at("rows"))
     numbers = read(Yarn, table, "rows", "material", "materials")
@@ -153,22 +153,22 @@ def _contact(value: object) -> ContactLaw:
 
 def _pair(value: object, contact: Table, i: int) -> MaterialPair:
     """The contact of two materials; what it leaves out is that of the rest."""
-    path = f"{contact.at('pairs')}[{i}]"
-    table = Table(value, path)
+    field = f"{contact.at('pairs')}[{i}]"
+    table = Table(value, field)
     table.only(("materials", *keys(MaterialPair)))
     wanted = "the names of two materials, such as ['silver', 'nylon']"
     names = table.items("materials", wanted)
     if len(names) != 2:
         raise refuse(table.at("materials"), names, f"it must list {wanted}")
     common = {key: entry for key, entry in contact.value.items() if key in keys(MaterialPair)}
-    values = read(MaterialPair, Table({**common, **table.value}, path), "materials")
+    values = read(MaterialPair, Table({**common, **table.value}, field), "materials")
     first, second = (name(each, f"{table.at('materials')}[{j}]") for j, each in enumerate(names))
     return MaterialPair(**values, materials=(first, second))
 
 
-def _loading(value: object, path: str) -> Loading:
+def _loading(value: object, field: str) -> Loading:
     keys = dict.fromkeys(key for taken in _LOADING_KEYS.values() for key in taken)
-    table = Table(value, path, ("name", "kind", *keys))
+    table = Table(value, field, ("name", "kind", *keys))
     label = name(table.get("name", "a name for the loading"), table.at("name"))
     kinds = tuple(_LOADING_KEYS)
     kind = one_of(table.get("kind", "one of " + ", ".join(map(repr, kinds))), table.at("kind"), kinds)
@@ -177,7 +177,7 @@ def _loading(value: object, path: str) -> Loading:
             allowed = ", ".join(map(repr, _LOADING_KEYS[kind]))
             raise refuse(table.at(key), table.value[key], f"a loading of kind {kind!r} takes {allowed}")
     free = one_of(table.value["free"], table.at("free"), ("x", "y")) if table.has("free") else ""
-    loading = _path(table, label, free) if kind == "path" else _stepped(table, label, kind, free)
+    loading = _stated(table, label, free) if kind == "path" else _stepped(table, label, kind, free)
     if not truth(table.value.get("unload", False), table.at("unload")):
         return loading
     _limit(table, "unload", 2 * len(loading.strains))
@@ -193,7 +193,7 @@ def _stepped(table: Table, label: str, kind: str, free: str) -> Loading:
     return shear(label, strains, free) if kind == "shear" else biaxial(label, strains)
 
 
-def _path(table: Table, label: str, free: str) -> Loading:
+def _stated(table: Table, label: str, free: str) -> Loading:
     listed = table.items("gradients", "one matrix [[Fxx, Fxy], [Fyx, Fyy]] for each state")
     _limit(table, "gradients", len(listed))
     gradients = tuple(check_gradient(F, f"{table.at('gradients')}[{i}]") for i, F in enumerate(listed))
@@ -240,21 +240,21 @@ def _limit(table: Table, key: str, states: int) -> None:
         raise refuse(table.at(key), states, f"a loading has at most {MOST_STATES} states")
 
 
-def _terminal(value: object, path: str, label: str) -> Terminal:
+def _terminal(value: object, field: str, label: str) -> Terminal:
     wanted = "it must be a list of yarn ends, such as ['warp2+', 'weft1-']"
     if not isinstance(value, list | tuple):
-        raise refuse(path, value, wanted)
+        raise refuse(field, value, wanted)
     ends = []
     for i, item in enumerate(value):
         match = _END.fullmatch(item) if isinstance(item, str) else None
         if match is None:
-            raise refuse(f"{path}[{i}]", item, "it must be a yarn name followed by + or -, such as 'warp2+'")
+            raise refuse(f"{field}[{i}]", item, "it must be a yarn name followed by + or -, such as 'warp2+'")
         ends.append((match[1], 1 if match[2] == "+" else -1))
     return Terminal(label, tuple(ends))
 
 
-def _probe(value: object, path: str) -> Probe:
-    table = Table(value, path, ("name", "source", "sink", "voltage"))
+def _probe(value: object, field: str) -> Probe:
+    table = Table(value, field, ("name", "source", "sink", "voltage"))
     return Probe(
         name=name(table.get("name", "a name for the probe"), table.at("name")),
         source=table.text("source", "the name of a terminal"),
@@ -263,7 +263,7 @@ def _probe(value: object, path: str) -> Probe:
     )
 
 
-def _choice(value: object, path: str, known: Mapping[str, _T]) -> _T:
+def _choice(value: object, field: str, known: Mapping[str, _T]) -> _T:
     if not isinstance(value, str) or value not in known:
-        raise refuse(path, value, "it must be one of " + ", ".join(map(repr, known)))
+        raise refuse(field, value, "it must be one of " + ", ".join(map(repr, known)))
     return known[value]

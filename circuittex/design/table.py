@@ -1,4 +1,4 @@
-"""A table of a design: its keys, types and units, each complaint with the dotted path of the key."""
+"""A table of a design: its keys, types and units, each complaint with the dotted name of the key."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ _LONGEST_KEY = 60  # characters shown of one
 
 
 class Table:
-    """A mapping at a dotted path of the design, of which only `known` keys may be used; any, where they are None."""
+    """A mapping at a dotted name of the design, of which only `known` keys may be used; any, where they are None."""
 
-    def __init__(self, value: object, path: str, known: tuple[str, ...] | None = None) -> None:
+    def __init__(self, value: object, field: str, known: tuple[str, ...] | None = None) -> None:
         if not isinstance(value, Mapping):
-            raise refuse(path or "design", value, f"it must be a table{path and f' [{path}]'}")
-        self.value, self.path = value, path
+            raise refuse(field or "design", value, f"it must be a table{field and f' [{field}]'}")
+        self.value, self.field = value, field
         for key in value:
             if not isinstance(key, str):
-                raise refuse(path or "design", key, "keys must be text")
+                raise refuse(field or "design", key, "keys must be text")
         if known is not None:
             self.only(known)
 
@@ -34,11 +34,11 @@ class Table:
                 raise refuse(self.at(key), self.value[key], _unknown(key, known))
 
     def at(self, key: str) -> str:
-        """Dotted path of a key."""
+        """Dotted name of a key."""
         shown = key if _BARE.fullmatch(key) else json.dumps(key)
         if len(shown) > _LONGEST_KEY:
             shown = shown[:_LONGEST_KEY] + "..."
-        return f"{self.path}.{shown}" if self.path else shown
+        return f"{self.field}.{shown}" if self.field else shown
 
     def has(self, key: str) -> bool:
         return key in self.value

@@ -129,11 +129,11 @@ def _crossings(lines: Lines, view: Floats, across: bool) -> Crossings:
     """The crossings in a view: two coordinates and the height of every point."""
     line = np.repeat(np.arange(len(lines.axis)), np.diff(lines.first))
     segments = np.flatnonzero(line[:-1] == line[1:])
-    order = segments[np.argsort(np.minimum(view[segments, 0], view[segments + 1, 0]), kind="stable")]
+    rising = segments[np.argsort(np.minimum(view[segments, 0], view[segments + 1, 0]), kind="stable")]
     hits = np.empty((0, 4), dtype=np.int64)
-    count = _find(view, line, lines.axis, order, across, hits)
+    count = _find(view, line, lines.axis, rising, across, hits)
     hits = np.empty((count, 4), dtype=np.int64)
-    _find(view, line, lines.axis, order, across, hits)
+    _find(view, line, lines.axis, rising, across, hits)
     pairs, numbers = _summed(hits[:, :2], hits[:, 2:])
     return Crossings(pairs, numbers[:, 0], numbers[:, 1])
 
@@ -162,17 +162,17 @@ def _upper(view: Any, p: int, q: int) -> bool:
 
 
 @compiled
-def _find(view: Any, line: Any, axis: Any, order: Any, across: bool, hits: Any) -> int:
+def _find(view: Any, line: Any, axis: Any, rising: Any, across: bool, hits: Any) -> int:
     """Number of crossings in the view; fills hits (H, 4): first and second line, sign, sign where the first is above.
 
-    order (S,): the segments, each by its first point, by the lower end of their first coordinate. `across`: pairs of
+    rising (S,): the segments, each by its first point, by the lower end of their first coordinate. `across`: pairs of
     lines of different axes, else of the same.
     """
     count = 0
-    for n in range(order.shape[0]):
-        high = max(view[order[n], 0], view[order[n] + 1, 0])
-        for m in range(n + 1, order.shape[0]):
-            i, j = order[n], order[m]
+    for n in range(rising.shape[0]):
+        high = max(view[rising[n], 0], view[rising[n] + 1, 0])
+        for m in range(n + 1, rising.shape[0]):
+            i, j = rising[n], rising[m]
             if min(view[j, 0], view[j + 1, 0]) > high:
                 break
             if line[i] == line[j] or (axis[line[i]] != axis[line[j]]) != across:

@@ -95,9 +95,9 @@ class FibrilMesh:
 
 
 def pair_label(mesh: FibrilMesh, first: int, second: int) -> str:
-    """Two fibrils in words, counted from 1: 'fibril 2 of warp1 and fibril 1 of weft2', for example."""
+    """Two fibrils in words, counted from 1: 'fibril 2 of warp1 and fibril 1 of weft2', or '... and itself'."""
     labels = []
     for fibril in (first, second):
         number = int(np.count_nonzero(mesh.yarn[: fibril + 1] == mesh.yarn[fibril]))
         labels.append(f"fibril {number} of {mesh.yarn_names[mesh.yarn[fibril]]}")
-    return " and ".join(labels)
+    return " and ".join([labels[0], labels[1] if first != second else "itself"])

@@ -1,4 +1,4 @@
-"""How far fibrils start inside one another and in which order, and the refusal of designs where either is not right."""
+"""How far fibrils start inside one another and on which sides, and the refusal of designs where either is not right."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def check_overlaps(weave: Weave, packing: Packing = Packing()) -> None:  # noqa:
 
     The overlap is R + R' - d, d the smallest distance of the centre lines, sampled independently of the mesh.
     The `DesignError` names the deepest pair and the key of the design that moves the two apart: the seed of the
-    `packing` where the regular one is in order.
+    `packing` where the regular one is allowed.
 
     >>> from circuittex.design import plain_weave
     >>> check_overlaps(plain_weave(yarns=2).weave)
@@ -45,17 +45,17 @@ def check_overlaps(weave: Weave, packing: Packing = Packing()) -> None:  # noqa:
         raise _refusal(weave, packing, lines.yarn, min(pair), max(pair), deepest)
 
 
-def check_order(weave: Weave, packing: Packing = Packing()) -> None:  # noqa: B008 (frozen)
+def check_starting_sides(weave: Weave, packing: Packing = Packing()) -> None:  # noqa: B008 (frozen)
     """Refuse a weave in which a warp and a weft fibril start on the wrong side of one another.
 
     Yarns of several rows can start so without being deep inside one another, row between row. The `DesignError` is
-    about the amplitude, or about the seed of the `packing` where the regular one is in order.
+    about the amplitude, or about the seed of the `packing` where the regular one is allowed.
 
     >>> from circuittex.design import plain_weave
-    >>> check_order(plain_weave(yarns=2).weave)
+    >>> check_starting_sides(plain_weave(yarns=2).weave)
     """
     if not packing.regular:
-        check_order(weave)
+        check_starting_sides(weave)
     lines = _sampled(weave, packing)
     n, samples = lines.position.shape[:2]
     axis = (lines.yarn >= len(weave.warp)).astype(np.int64)

@@ -8,7 +8,7 @@ from circuittex.design import Design, Material
 from circuittex.design.declaration import keys
 from circuittex.geometry.centre_lines import centre_lines
 from circuittex.geometry.mesh import FibrilMesh
-from circuittex.geometry.overlap import check_order, check_overlaps
+from circuittex.geometry.overlap import check_overlaps, check_starting_sides
 
 
 def build_mesh(design: Design) -> FibrilMesh:
@@ -27,7 +27,7 @@ def build_mesh(design: Design) -> FibrilMesh:
     """
     weave, numerics = design.weave, design.numerics
     check_overlaps(weave, design.packing)
-    check_order(weave, design.packing)
+    check_starting_sides(weave, design.packing)
     elements = design.resolution.elements
     n_nodes = numerics.order * elements + 1
     lines = centre_lines(weave, n_nodes, design.packing)

@@ -10,13 +10,13 @@ import numpy as np
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import cores, side_by_side
 from circuittex.mech.configuration import Configuration
-from circuittex.mech.kernels import N_STRAINS, beam_energy, section_force
+from circuittex.mech.kernels import N_STRAINS, Elements, beam_energy, section_force
 from circuittex.mech.material import bending_lambda, lame
 from circuittex.mech.pattern import DOFS, Pattern
 from circuittex.mech.scales import line_matrix
 from circuittex.mech.section import disk_rule
 from circuittex.mech.space import BeamSpace
-from circuittex.mech.tangent import add_tangent
+from circuittex.mech.tangent import Sums, add_tangent
 
 WORTH_A_THREAD = 200
 """Elements whose assembly takes several times as long as it takes to start a thread."""
@@ -37,46 +37,46 @@ class Beam:
         if np.any(lam > lam_b):  # one more point, on the axis, for the rest of lambda
             unit, share = np.vstack([unit, [0.0, 0.0]]), np.append(share, 1.0)
         on_axis = np.arange(len(unit)) >= len(disk_rule(degree)[1])
-        self.space = space
-        self.nodes, self.shape, self.slope = mesh.elements, space.shape, space.slope
-        self.mu = np.where(on_axis, 0.0, mu[fibril, None])
-        self.lam = np.where(on_axis, (lam - lam_b)[fibril, None], lam_b[fibril, None])
-        self.points = np.swapaxes(unit * mesh.radius[fibril, None, None], 1, 2).copy()
-        self.area = share * mesh.area[fibril, None, None] * np.ones_like(space.weight)[..., None]
-        self.natural, self.metric = _straight(space)
+        points = np.swapaxes(unit * mesh.radius[fibril, None, None], 1, 2).copy()
+        area = share * mesh.area[fibril, None, None] * np.ones_like(space.weight)[..., None]
+        strains, metric = _straight(space)
         if natural is not None:
-            self.natural, self.metric = _curved(self._strains(space.vector(natural)), self.points)
-            self.area = self.area * np.asarray(np.sqrt(np.linalg.det(self.metric)), dtype=np.float64)
-        self.weight = self.area * space.weight[..., None]
+            strains, metric = _curved(_strains(space, space.vector(natural)), points)
+            area = area * np.asarray(np.sqrt(np.linalg.det(metric)), dtype=np.float64)
+        self.space = space
+        self.elements = Elements(
+            nodes=mesh.elements,
+            shape=space.shape,
+            slope=space.slope,
+            weight=area * space.weight[..., None],
+            points=points,
+            natural=strains,
+            metric=metric,
+            mu=np.where(on_axis, 0.0, mu[fibril, None]),
+            lam=np.where(on_axis, (lam - lam_b)[fibril, None], lam_b[fibril, None]),
+        )
+        self.by_area = self.elements._replace(weight=area)
         self.quadratic = self._quadratic()
         self.stiffness = self._stiffness()
 
-    def _strains(self, q: Floats) -> Floats:
-        """(M, Q, 5, 3) g1, g2, r', g1', g2' at the line points."""
-        x = q.reshape(-1, 3, 3)[self.nodes]
-        value, slope = np.einsum("qa,eapc->eqpc", self.shape, x), np.einsum("eqa,eapc->eqpc", self.slope, x)
-        return np.concatenate([value[:, :, 1:], slope], axis=2)
-
     def _quadratic(self) -> Floats:
         """(M, Q, 5, 5) mu/2 tr F^T F dA = 1/2 u.C u: the matrices C, N."""
-        straight = self.metric.shape[2] == 0
-        inverse = np.eye(3) * np.ones((*self.area.shape, 1, 1)) if straight else np.linalg.inv(self.metric)
-        x, y = self.points[:, 0], self.points[:, 1]
+        area, metric = self.by_area.weight, self.elements.metric
+        straight = metric.shape[2] == 0
+        inverse = np.eye(3) * np.ones((*area.shape, 1, 1)) if straight else np.linalg.inv(metric)
+        x, y = self.elements.points[:, 0], self.elements.points[:, 1]
         to_columns = np.zeros((*x.shape, 3, N_STRAINS))  # F = u^T to_columns^T
         to_columns[..., [0, 1, 2], [0, 1, 2]] = 1.0
         to_columns[..., 2, 3], to_columns[..., 2, 4] = x, y
-        return np.asarray(
-            np.einsum(
-                "eqs,es,esim,eqsij,esjn->eqmn", self.area, self.mu, to_columns, inverse, to_columns, optimize=True
-            )
-        )
+        tables = area, self.elements.mu, to_columns, inverse, to_columns
+        return np.asarray(np.einsum("eqs,es,esim,eqsij,esjn->eqmn", *tables, optimize=True))
 
     def _stiffness(self) -> Floats:
         """(M, 3 n, 3 n) the same integrated along each element for its nodal vectors r, g1, g2, N/mm."""
-        M, Q, n = self.slope.shape
+        M, Q, n = self.elements.slope.shape
         to_strains = np.zeros((M, Q, n, 3, N_STRAINS))
-        to_strains[..., 1, 0] = to_strains[..., 2, 1] = self.shape
-        to_strains[..., 0, 2] = to_strains[..., 1, 3] = to_strains[..., 2, 4] = self.slope
+        to_strains[..., 1, 0] = to_strains[..., 2, 1] = self.elements.shape
+        to_strains[..., 0, 2] = to_strains[..., 1, 3] = to_strains[..., 2, 4] = self.elements.slope
         B = to_strains.reshape(M, Q, 3 * n, N_STRAINS)
         return np.asarray(np.einsum("eq,eqkm,eqmp,eqlp->ekl", self.space.weight, B, self.quadratic, B, optimize=True))
 
@@ -86,14 +86,10 @@ class Beam:
 
     def pairs(self) -> tuple[Ints, Ints]:
         """All node pairs of each element, with all nine unknowns."""
-        n = self.nodes.shape[1]
-        i, j = np.triu_indices(n, 1)
-        full = self.nodes[:, np.stack([i, j], axis=1)].reshape(-1, 2)
+        nodes = self.elements.nodes
+        i, j = np.triu_indices(nodes.shape[1], 1)
+        full = nodes[:, np.stack([i, j], axis=1)].reshape(-1, 2)
         return full, np.empty((0, 2), dtype=np.int64)
-
-    def _arguments(self, q: Floats, weight: Floats) -> tuple[Any, ...]:
-        tables = self.nodes, self.shape, self.slope, weight, self.points, self.natural, self.metric, self.mu, self.lam
-        return q.reshape(-1, DOFS), *tables
 
     def _by_fibrils(self, kernel: Callable[..., object], *arguments: Any) -> None:
         """Call a kernel for the elements of all fibrils, in as many pieces as there are cores for them.
@@ -107,8 +103,8 @@ class Beam:
 
     def energy(self, q: Floats) -> float:
         """Elastic energy, N mm; infinite where a section has turned inside out."""
-        energy = np.empty(len(self.nodes))
-        self._by_fibrils(beam_energy, *self._arguments(q, self.weight), energy)
+        energy = np.empty(len(self.stiffness))
+        self._by_fibrils(beam_energy, q.reshape(-1, DOFS), self.elements, energy)
         return float(energy.sum())
 
     def longest(self, q: Floats, direction: Floats) -> float:
@@ -117,22 +113,15 @@ class Beam:
 
     def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
         """Add gradient and tangent in place, nothing to `softening`; return the energy."""
-        energy = np.empty(len(self.nodes))
-        self._by_fibrils(
-            add_tangent,
-            *self._arguments(q, self.weight),
-            self.stiffness,
-            energy,
-            pattern.indptr,
-            gradient,
-            data,
-        )
+        energy = np.empty(len(self.stiffness))
+        sums = Sums(pattern.indptr, gradient, data)
+        self._by_fibrils(add_tangent, q.reshape(-1, DOFS), self.elements, self.stiffness, energy, sums)
         return float(energy.sum())
 
     def section_force(self, q: Floats) -> Floats:
         """(M, 3) section force ∫ P E3 dA at mid-element, N."""
         force = np.empty((*self.space.weight.shape, 3))
-        self._by_fibrils(section_force, *self._arguments(q, self.area), self.quadratic, force)
+        self._by_fibrils(section_force, q.reshape(-1, DOFS), self.by_area, self.quadratic, force)
         return np.asarray(force.mean(axis=1))
 
     def mass(self, pattern: Pattern) -> Floats:
@@ -140,6 +129,13 @@ class Beam:
         mesh = self.space.mesh
         line = mesh.density * mesh.area
         return line_matrix(self.space, pattern, line, line * mesh.radius**2 / 4)
+
+
+def _strains(space: BeamSpace, q: Floats) -> Floats:
+    """(M, Q, 5, 3) g1, g2, r', g1', g2' at the line points."""
+    x = q.reshape(-1, 3, 3)[space.mesh.elements]
+    value, slope = np.einsum("qa,eapc->eqpc", space.shape, x), np.einsum("eqa,eapc->eqpc", space.slope, x)
+    return np.concatenate([value[:, :, 1:], slope], axis=2)
 
 
 def _straight(space: BeamSpace) -> tuple[Floats, Floats]:

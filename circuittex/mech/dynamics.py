@@ -20,6 +20,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import count, islice
 from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 
@@ -152,15 +153,26 @@ class Inertia:
         return self.energy(q)
 
 
+class Body(NamedTuple):
+    """What moves."""
+
+    terms: Sequence[ForceTerm]
+    """The forces on it."""
+    scales: Scales
+    """What is small for it."""
+    mass: MatrixOf
+    """The mass matrix in g."""
+    damping: MatrixOf
+    """The damping matrix in N s/mm."""
+    fixed: Ints
+    """The prescribed unknowns."""
+
+
 def march(
-    terms: Sequence[ForceTerm],
+    body: Body,
     q: Floats,
     velocity: Floats,
     *,
-    scales: Scales,
-    mass: MatrixOf,
-    damping: MatrixOf,
-    fixed: Ints,
     solver: LinearSolver,
     dt: float,
     tolerance: float,
@@ -168,20 +180,21 @@ def march(
 ) -> Iterator[Instant]:
     """Endless steps of backward Euler of `dt` seconds from q (n_dofs,) and `velocity` (n_dofs,), one by one.
 
-    The `fixed` unknowns keep their initial velocity; each step is solved until no free force exceeds
-    `tolerance` (N), by what the `scales` call small. `mass` gives the mass matrix in g, `damping` its matrix in N s/mm.
+    The body's fixed unknowns keep their initial velocity; each step is solved until no free force exceeds
+    `tolerance` (N), by what its scales call small.
 
     Raises `ConvergenceError` where a step is not solved in `max_iterations`.
     """
     _check_positive(dt=dt)
-    inertia = Inertia(mass, damping, dt)
-    free = np.ones(len(q), dtype=bool)
-    free[fixed] = False
+    scales, fixed = body.scales, body.fixed
+    inertia = Inertia(body.mass, body.damping, dt)
+    free_dofs = np.ones(len(q), dtype=bool)
+    free_dofs[fixed] = False
     driven = bool(np.any(velocity[fixed]))
     for step in count(1):
         inertia.depart(q, velocity)
         found = minimise(
-            [*terms, inertia],
+            [*body.terms, inertia],
             # Where supports move the body goes along; else a start at q is sure to lower the potential.
             q + dt * velocity if driven else q,
             scales=scales,
@@ -191,7 +204,7 @@ def march(
             force_tolerance=tolerance,
             max_iterations=max_iterations,
         )
-        velocity, q = np.where(free, (found.q - q) / dt, velocity), found.q
+        velocity, q = np.where(free_dofs, (found.q - q) / dt, velocity), found.q
         gradient = found.gradient - inertia.gradient(q)
         yield Instant(
             time=step * dt,
@@ -200,7 +213,7 @@ def march(
             gradient=gradient,
             energy=found.energy - inertia.energy(q),
             kinetic=inertia.kinetic(velocity),
-            residual=float(scales.forces(np.where(free, gradient, 0.0)).max()),
+            residual=float(scales.forces(np.where(free_dofs, gradient, 0.0)).max()),
             iterations=found.iterations,
         )
 
@@ -216,13 +229,9 @@ def affine_velocity(space: BeamSpace, q: Floats, rate: Floats) -> Floats:
 
 
 def relax_dynamically(
-    terms: Sequence[ForceTerm],
+    body: Body,
     q: Floats,
     *,
-    scales: Scales,
-    mass: MatrixOf,
-    damping: MatrixOf,
-    fixed: Ints,
     solver: LinearSolver,
     dt: float,
     t_relax: float,
@@ -234,7 +243,7 @@ def relax_dynamically(
     """Step 1 of Algorithm 1: move for `t_step`, stop, and relax with damping until at rest.
 
     `velocity` (n_dofs,) is that of `affine_velocity`, needed where `t_step` > 0: for that time it drives the
-    `fixed` unknowns, the others start with it, and nothing damps them. Then all velocities are set to zero,
+    fixed unknowns, the others start with it, and nothing damps them. Then all velocities are set to zero,
     the fixed unknowns are held, and damped motion follows until no free static force exceeds `tolerance` (N).
 
     Raises `ConvergenceError`, with the history, where that takes longer than `t_relax` seconds or where a
@@ -243,22 +252,13 @@ def relax_dynamically(
     _check_positive(dt=dt, t_relax=t_relax)
     if (velocity is None) != (t_step == 0.0) or not 0.0 <= t_step < np.inf:
         raise DesignError("t_step", t_step, "it must be positive with a velocity, 0 s without")
-    motion = partial(
-        march,
-        terms,
-        scales=scales,
-        mass=mass,
-        fixed=fixed,
-        solver=solver,
-        tolerance=STEP_TOLERANCE * tolerance,
-        max_iterations=max_iterations,
-    )
+    motion = partial(march, solver=solver, tolerance=STEP_TOLERANCE * tolerance, max_iterations=max_iterations)
     past: list[Instant] = []
     if velocity is not None:
         steps = ceil(t_step / dt)
-        past += islice(motion(q, velocity, damping=_undamped, dt=t_step / steps), steps)
+        past += islice(motion(body._replace(damping=_undamped), q, velocity, dt=t_step / steps), steps)
         q = past[-1].q
-    for instant in islice(motion(q, np.zeros_like(q), damping=damping, dt=dt), ceil(t_relax / dt)):
+    for instant in islice(motion(body, q, np.zeros_like(q), dt=dt), ceil(t_relax / dt)):
         past.append(instant)
         if instant.residual <= tolerance:
             return Rest(

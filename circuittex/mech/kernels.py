@@ -14,10 +14,11 @@ and the metric of its strains change.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import compiled
 
 N_STRAINS = 5
@@ -25,6 +26,29 @@ LEAST, LARGEST = 0.64, 1.5625
 """J^2 between which the series of the logarithm serves: |z| < 0.22."""
 SERIES = 12
 """Its terms: the next is below 0.22^24 / 25 < 1e-17 of the first."""
+
+
+class Elements(NamedTuple):
+    """M elements of n nodes with Q line points and S section points, as compiled functions take them."""
+
+    nodes: Ints
+    """(M, n), those of an element one after another."""
+    shape: Floats
+    """(Q, n) shape functions at the line points."""
+    slope: Floats
+    """(M, Q, n) their derivatives, 1/mm."""
+    weight: Floats
+    """(M, Q, S) volumes that section points stand for, mm3; or (`section_force`) their areas, mm2."""
+    points: Floats
+    """(1 or M, 2, S) coordinates in the section, mm."""
+    natural: Floats
+    """(1 or M, Q, 5, 5) products of the natural strains."""
+    metric: Floats
+    """(M, Q, S, 3, 3) of curved natural shapes; (1, Q, 0, 3, 3) of straight ones."""
+    mu: Floats
+    """(M, S) Lamé parameters of the section points, MPa."""
+    lam: Floats
+    """(M, S)."""
 
 
 @compiled
@@ -134,10 +158,10 @@ def _volumes(j: Any, points: Any, squared: Any, volume: Any) -> tuple[int, int]:
 
 
 @compiled
-def section(u: Any, normal: Any, natural: Any, metric: Any, points: Any, d: Any, j: Any, work: Any) -> bool:
+def section(u: Any, normal: Any, natural: Any, metric: Any, points: Any, d: Any, j: Any, scratch: Any) -> bool:
     """State of all section points of one line point; False where one is inside out.
 
-    Fills d (5, 5) with the products of strains less the natural ones, j (3,), and the rows of work (4, S): tr c / 2,
+    Fills d (5, 5) with the products of strains less the natural ones, j (3,), and the rows of scratch (4, S): tr c / 2,
     J^2, ln J, and the volume before the natural shape is divided out. natural (5, 5); metric (S, 3, 3), or (0, 3, 3)
     for a straight natural shape; points (2, S).
     """
@@ -148,39 +172,39 @@ def section(u: Any, normal: Any, natural: Any, metric: Any, points: Any, d: Any,
     for i in range(3):
         j[i] = u[2 + i, 0] * normal[0] + u[2 + i, 1] * normal[1] + u[2 + i, 2] * normal[2]
     if metric.shape[0] > 0:
-        _stretch_curved(d, points, metric, work[0], work[1], work[3])
+        _stretch_curved(d, points, metric, scratch[0], scratch[1], scratch[3])
     else:
-        _stretch_straight(d, points, work[0], work[1])
-        work[3] = 1.0
-    _logarithms(work[1], work[2])
-    right, far = _volumes(j, points, work[1], work[3])
+        _stretch_straight(d, points, scratch[0], scratch[1])
+        scratch[3] = 1.0
+    _logarithms(scratch[1], scratch[2])
+    right, far = _volumes(j, points, scratch[1], scratch[3])
     if right < points.shape[1]:
         return False
     if far > 0:
         for s in range(points.shape[1]):
-            if not LEAST < work[1, s] < LARGEST:
-                work[2, s] = 0.5 * np.log(work[1, s])
+            if not LEAST < scratch[1, s] < LARGEST:
+                scratch[2, s] = 0.5 * np.log(scratch[1, s])
     return True
 
 
 @compiled
-def energy(weight: Any, mu: Any, lam: Any, work: Any) -> float:
+def energy(weight: Any, mu: Any, lam: Any, scratch: Any) -> float:
     """Sum of w (mu (tr c / 2 - ln J) + lambda/2 (ln J)^2) over the section points."""
     total = 0.0
     for s in range(weight.shape[0]):
-        log = work[2, s]
-        total += weight[s] * (mu[s] * (work[0, s] - log) + 0.5 * lam[s] * log * log)
+        log = scratch[2, s]
+        total += weight[s] * (mu[s] * (scratch[0, s] - log) + 0.5 * lam[s] * log * log)
     return total
 
 
 @compiled
-def moments(weight: Any, points: Any, mu: Any, lam: Any, work: Any, p: Any, A: Any) -> None:
-    """Fill p (3,) and A (3, 3) with the section's moments of f' and f''; overwrites work's first two rows with these.
+def moments(weight: Any, points: Any, mu: Any, lam: Any, scratch: Any, p: Any, A: Any) -> None:
+    """Fill p (3,) and A (3, 3) with the section's moments of f' and f'', which overwrite scratch's first two rows.
 
     The sums keep their order, so only what comes before them is computed for several points at once.
     """
     p0 = p1 = p2 = a00 = a01 = a02 = a11 = a12 = a22 = 0.0
-    slopes, curvatures, log, volume = work[0], work[1], work[2], work[3]
+    slopes, curvatures, log, volume = scratch[0], scratch[1], scratch[2], scratch[3]
     for s in range(weight.shape[0]):
         inverse, slope = 1.0 / volume[s], lam[s] * log[s] - mu[s]
         slopes[s] = weight[s] * slope * inverse
@@ -204,68 +228,40 @@ def moments(weight: Any, points: Any, mu: Any, lam: Any, work: Any, p: Any, A: A
 
 
 @compiled
-def beam_energy(
-    first: int,
-    last: int,
-    x: Any,
-    nodes: Any,
-    shape: Any,
-    slope: Any,
-    weight: Any,
-    points: Any,
-    natural: Any,
-    metric: Any,
-    mu: Any,
-    lam: Any,
-    out: Any,
-) -> None:
+def beam_energy(first: int, last: int, x: Any, elements: Any, out: Any) -> None:
     """Fill out (M,) with the elastic energy, N mm, of elements first to last; infinite where one is inside out.
 
-    x (N, 9); nodes (M, n); shape (Q, n); slope (M, Q, n); weight (M, Q, S) volumes; points (1 or M, 2, S); natural
-    (1 or M, Q, 5, 5); metric (1, Q, 0, 3, 3) or (M, Q, S, 3, 3); mu, lam (M, S).
+    x (N, 9).
     """
-    u, normal, j, work = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, weight.shape[2]))
+    nodes, shape, slope, weight, points, natural, metric, mu, lam = elements
+    u, normal, j, scratch = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, weight.shape[2]))
     d = np.empty((N_STRAINS, N_STRAINS))
     for e in range(first, last):
         block, shaped = min(e, points.shape[0] - 1), min(e, natural.shape[0] - 1)
         out[e] = 0.0
         for q in range(shape.shape[0]):
             strains(nodes[e], x, shape[q], slope[e, q], u, normal)
-            if section(u, normal, natural[shaped, q], metric[shaped, q], points[block], d, j, work):
-                out[e] += energy(weight[e, q], mu[e], lam[e], work)
+            if section(u, normal, natural[shaped, q], metric[shaped, q], points[block], d, j, scratch):
+                out[e] += energy(weight[e, q], mu[e], lam[e], scratch)
             else:
                 out[e] = np.inf
 
 
 @compiled
-def section_force(
-    first: int,
-    last: int,
-    x: Any,
-    nodes: Any,
-    shape: Any,
-    slope: Any,
-    area: Any,
-    points: Any,
-    natural: Any,
-    metric: Any,
-    mu: Any,
-    lam: Any,
-    quadratic: Any,
-    force: Any,
-) -> None:
-    """Fill force (M, Q, 3) with the section force dE/dr' = ∫ P E3 dA, N; area (M, Q, S) section weights, mm2.
+def section_force(first: int, last: int, x: Any, elements: Any, quadratic: Any, force: Any) -> None:
+    """Fill force (M, Q, 3) with the section force dE/dr' = ∫ P E3 dA, N, of elements whose weights are areas.
 
-    quadratic (M, Q, 5, 5): the part of it that is linear in u.
+    x (N, 9); quadratic (M, Q, 5, 5): the part of it that is linear in u.
     """
-    u, normal, j, work = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, area.shape[2]))
+    nodes, shape, slope, area, points, natural, metric, mu, lam = elements
+    u, normal, j, scratch = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, area.shape[2]))
     d, p, A = np.empty((N_STRAINS, N_STRAINS)), np.empty(3), np.empty((3, 3))
     for e in range(first, last):
         block, shaped = min(e, points.shape[0] - 1), min(e, natural.shape[0] - 1)
         for q in range(shape.shape[0]):
             strains(nodes[e], x, shape[q], slope[e, q], u, normal)
-            section(u, normal, natural[shaped, q], metric[shaped, q], points[block], d, j, work)
-            moments(area[e, q], points[block], mu[e], lam[e], work, p, A)
+            section(u, normal, natural[shaped, q], metric[shaped, q], points[block], d, j, scratch)
+            moments(area[e, q], points[block], mu[e], lam[e], scratch, p, A)
             for c in range(3):
                 force[e, q, c] = p[0] * normal[c]
                 for m in range(N_STRAINS):

@@ -38,9 +38,10 @@ class MultifrontalSolver:
     def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
         """A function that solves with the matrix (until the next call), or None if a pivot is not positive."""
         if self._coupled.renew(pattern, data):
-            last = None if self._cholesky is None else self._cholesky.analysis
+            last = self._cholesky
+            analysis = None if last is None else last.analysis
             entries = Entries(pattern.indptr, pattern.indices, self._coupled.entries)
-            self._cholesky = Cholesky(analyse(blocks(pattern, self._coupled.pairs), entries, last))
+            self._cholesky = Cholesky(analyse(blocks(pattern, self._coupled.pairs), entries, analysis), last)
         assert self._cholesky is not None, "no pairs were renewed"
         return self._cholesky.factor(data[self._coupled.entries])
 

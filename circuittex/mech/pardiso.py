@@ -56,8 +56,8 @@ class PardisoSolver:
         if self._coupled.renew(pattern, data):
             self._release()
             entries = self._coupled.entries
-            parts = data[entries], pattern.indices[entries], self._coupled.start()
-            self._matrix = sp.csr_matrix(parts, shape=(pattern.n_dofs, pattern.n_dofs))
+            rows = data[entries], pattern.indices[entries], self._coupled.start()
+            self._matrix = sp.csr_matrix(rows, shape=(pattern.n_dofs, pattern.n_dofs))
             self._call(self._ANALYSE, nothing)
         self._matrix.data = data[self._coupled.entries]
         try:

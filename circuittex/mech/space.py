@@ -72,8 +72,8 @@ def gauss(points: int) -> tuple[Floats, Floats]:
     return (t[None, :] + 1) / 2, w / 2
 
 
-def beam_space(mesh: FibrilMesh, free: str = "") -> BeamSpace:
-    """The space for a mesh, every fibril end's position prescribed but for those of yarns along `free`, 'x' or 'y'."""
+def beam_space(mesh: FibrilMesh, free_edges: str = "") -> BeamSpace:
+    """The space for a mesh, every fibril end held in place but for those of yarns along `free_edges`, 'x' or 'y'."""
     basis = vector_basis(mesh)
     scalar = skfem.Basis(basis.mesh, type(basis.elem.elem)(), quadrature=gauss(mesh.order))
     exact = skfem.Basis(basis.mesh, type(basis.elem.elem)(), quadrature=gauss(mesh.order + 1))
@@ -85,7 +85,7 @@ def beam_space(mesh: FibrilMesh, free: str = "") -> BeamSpace:
 
     shape, slope = tables(scalar)
     exact_shape, _ = tables(exact)
-    axis = ("x", "y", "").index(one_of(free, "free", ("x", "y", "")))
+    axis = ("x", "y", "").index(one_of(free_edges, "free_edges", ("x", "y", "")))
     held = mesh.yarn_axis[mesh.yarn] != axis
     ends = np.concatenate([mesh.end_nodes(-1)[held], mesh.end_nodes(+1)[held]])
     return BeamSpace(

@@ -9,10 +9,11 @@ matrix. Elements of different fibrils share no node and no entry, so they can be
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import compiled
 from circuittex.mech.kernels import N_STRAINS, energy, moments, section, strains
 
@@ -20,6 +21,17 @@ WIDTH = 32
 """Length of a row of the 27 unknowns of a quadratic element, filled up."""
 RANK = 6
 """Three coefficients j_i at each of two line points at most."""
+
+
+class Sums(NamedTuple):
+    """What elements are added to."""
+
+    indptr: Ints
+    """(n_dofs + 1,) row starts of the pattern."""
+    gradient: Floats
+    """(n_dofs,), N."""
+    data: Floats
+    """(nnz,) tangent, N/mm."""
 
 
 @compiled
@@ -95,8 +107,8 @@ def _products(V: Any, W: Any, K: Any) -> None:
 
 
 @compiled
-def _add_gradient(nodes: Any, x: Any, stiffness: Any, g: Any, total: Any) -> None:
-    """Add the element's gradient, that of the constant stiffness (3 n, 3 n) included, to total (n_dofs,)."""
+def _add_gradient(nodes: Any, x: Any, stiffness: Any, g: Any, gradient: Any) -> None:
+    """Add the element's gradient g, that of the constant stiffness (3 n, 3 n) included, to gradient (n_dofs,)."""
     for k in range(stiffness.shape[0]):
         t0, t1, t2 = g[3 * k], g[3 * k + 1], g[3 * k + 2]
         for j in range(nodes.shape[0]):
@@ -107,9 +119,9 @@ def _add_gradient(nodes: Any, x: Any, stiffness: Any, g: Any, total: Any) -> Non
                 t1 += factor * row[3 * m + 1]
                 t2 += factor * row[3 * m + 2]
         at = 9 * nodes[k // 3] + 3 * (k % 3)
-        total[at] += t0
-        total[at + 1] += t1
-        total[at + 2] += t2
+        gradient[at] += t0
+        gradient[at + 1] += t1
+        gradient[at + 2] += t2
 
 
 @compiled
@@ -126,30 +138,14 @@ def _add_tangent(nodes: Any, K: Any, indptr: Any, data: Any) -> None:
 
 
 @compiled
-def add_tangent(
-    first: int,
-    last: int,
-    x: Any,
-    nodes: Any,
-    shape: Any,
-    slope: Any,
-    weight: Any,
-    points: Any,
-    natural: Any,
-    metric: Any,
-    mu: Any,
-    lam: Any,
-    stiffness: Any,
-    out: Any,
-    indptr: Any,
-    total: Any,
-    data: Any,
-) -> None:
-    """Add gradient (n_dofs,), N, and tangent (nnz,), N/mm, of elements first to last; fill out (M,) with energies.
+def add_tangent(first: int, last: int, x: Any, elements: Any, stiffness: Any, out: Any, sums: Any) -> None:
+    """Add gradient and tangent of elements first to last to the sums; fill out (M,) with their energies, N mm.
 
-    Arguments as `beam_energy`, the nodes of an element one after another; stiffness (M, 3 n, 3 n).
+    x (N, 9); stiffness (M, 3 n, 3 n), N/mm.
     """
-    u, normal, j, work = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, weight.shape[2]))
+    nodes, shape, slope, weight, points, natural, metric, mu, lam = elements
+    indptr, gradient, data = sums
+    u, normal, j, scratch = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, weight.shape[2]))
     d, p, A = np.empty((N_STRAINS, N_STRAINS)), np.empty(3), np.empty((3, 3))
     V, W = np.zeros((RANK, WIDTH)), np.zeros((RANK, WIDTH))
     vectors = stiffness.shape[1]
@@ -159,16 +155,16 @@ def add_tangent(
         out[e], g[:], C[:] = 0.0, 0.0, 0.0
         for q in range(shape.shape[0]):
             strains(nodes[e], x, shape[q], slope[e, q], u, normal)
-            if not section(u, normal, natural[shaped, q], metric[shaped, q], points[block], d, j, work):
+            if not section(u, normal, natural[shaped, q], metric[shaped, q], points[block], d, j, scratch):
                 out[e] = np.inf
                 continue
-            out[e] += energy(weight[e, q], mu[e], lam[e], work)
-            moments(weight[e, q], points[block], mu[e], lam[e], work, p, A)
+            out[e] += energy(weight[e, q], mu[e], lam[e], scratch)
+            moments(weight[e, q], points[block], mu[e], lam[e], scratch, p, A)
             here = slice(3 * q, 3 * q + 3)
             _volume_slopes(u, normal, shape[q], slope[e, q], V[here])
             _weighted(p, A, V[here], W[here], g)
             _turn(u, shape[q], slope[e, q], p, C)
         _spread(stiffness[e], C, K)
         _products(V, W, K)
-        _add_gradient(nodes[e], x, stiffness[e], g, total)
+        _add_gradient(nodes[e], x, stiffness[e], g, gradient)
         _add_tangent(nodes[e], K, indptr, data)

@@ -15,10 +15,14 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.mech.linear import LinearSolver
-from circuittex.mech.minimise import minimise
+from circuittex.mech.minimise import Minimum, minimise
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.scales import fibril_scales
 from circuittex.mech.space import BeamSpace, beam_space
+from circuittex.relaxation.continuation import continued
+
+ROUGHLY = 1e-3
+"""Tolerance of a descent with softer contacts than there are, which only leads near a minimum."""
 
 
 @frozen
@@ -35,15 +39,16 @@ class Equilibrium:
     residual: float
     """Largest free force, N; moments on directors over half a pitch."""
     iterations: int
-    """Linear systems solved: Newton iterations, and one for the prediction where there was one."""
+    """Linear systems solved: Newton iterations, and one for the prediction where there was one; of all descents, where
+    softer contacts came first (`continued`)."""
     history: Floats
-    """(Newton iterations + 1, 4) residual N, potential N mm, shift (`minimise`), step length."""
+    """(Newton iterations + 1, 4) residual N, potential N mm, shift (`minimise`), step length, of the last descent."""
 
 
-def force_terms(mesh: FibrilMesh, design: Design, free: str = "") -> tuple[BeamSpace, Beam, PenaltyContact]:
+def force_terms(mesh: FibrilMesh, design: Design, free_edges: str = "") -> tuple[BeamSpace, Beam, PenaltyContact]:
     """The space of the fibrils and the two force terms, elasticity and contact, that a design asks for."""
     numerics = design.numerics
-    space = beam_space(mesh, free)
+    space = beam_space(mesh, free_edges)
     beam = Beam(space, degree=numerics.section_degree)
     contact = PenaltyContact(mesh, law=design.contact, per_element=design.resolution.contact_points)
     return space, beam, contact
@@ -55,32 +60,41 @@ def relax(
     start: Configuration | None = None,
     *,
     before: Configuration | None = None,
-    free: str = "",
+    free_edges: str = "",
     solver: LinearSolver | None = None,
     report: Callable[[int, float], None] | None = None,
 ) -> Equilibrium:
     """The equilibrium that descent from `start` (by default the initial weave) reaches, ends held as there.
 
     Where `start` was moved from the equilibrium `before`, the descent starts from what that predicts. The
-    ends of yarns along `free`, 'x' or 'y', are not held.
+    ends of yarns along `free_edges`, 'x' or 'y', are not held.
 
     Raises `ConvergenceError` with the history where it is not reached.
     """
-    space, beam, contact = force_terms(mesh, design, free)
+    space, beam, contact = force_terms(mesh, design, free_edges)
     start = start if start is not None else initial_configuration(mesh)
     moved = before is not None and not same(before, start)
-    minimum = minimise(
-        [beam, contact],
-        space.vector(start),
-        scales=fibril_scales(space, design.weave.pitch, largest_penalty(mesh, design.contact)),
-        fixed=space.fixed,
-        solver=solver if solver is not None else MultifrontalSolver(),
-        before=space.vector(before) if before is not None and moved else None,
-        tolerance=design.numerics.relative_tolerance,
-        force_tolerance=design.numerics.force_tolerance,
-        max_iterations=design.numerics.max_iterations,
-        report=report,
-    )
+    numerics, solver = design.numerics, solver if solver is not None else MultifrontalSolver()
+    scales = fibril_scales(space, design.weave.pitch, largest_penalty(mesh, design.contact))
+
+    def descend(q: Floats, part: float, may_creep: bool) -> Minimum:
+        contact.part, true = part, part == 1.0
+        return minimise(
+            [beam, contact],
+            q,
+            scales=scales,
+            fixed=space.fixed,
+            solver=solver,
+            before=space.vector(before) if before is not None and moved else None,
+            tolerance=numerics.relative_tolerance if true else ROUGHLY,
+            force_tolerance=numerics.force_tolerance if true else 0.0,
+            max_iterations=numerics.max_iterations,
+            may_creep=may_creep,
+            report=report,
+        )
+
+    q = space.vector(start)
+    minimum = descend(q, 1.0, True) if before is not None else continued(descend, q)
     return Equilibrium(
         configuration=space.configuration(minimum.q),
         reaction=space.configuration(minimum.gradient).r,

@@ -18,16 +18,16 @@ REST = np.eye(2)
 
 
 def check_sides(
-    mesh: FibrilMesh, design: Design, r: Floats, gradient: Floats, free: str = "", history: Any = ()
+    mesh: FibrilMesh, design: Design, r: Floats, gradient: Floats, free_edges: str = "", history: Any = ()
 ) -> None:
     """Refuse nodes r (N, 3) at which fibrils have passed through one another or slipped off one another's ends.
 
-    `gradient` (2, 2) is the average one from the start to r; yarns along `free`, 'x' or 'y', have free ends; `history`
-    is that of the descent which led there, for the error.
+    `gradient` (2, 2) is the average one from the start to r; yarns along `free_edges`, 'x' or 'y', have free ends;
+    `history` is that of the descent which led there, for the error.
 
     Raises `PenetrationError`, with one sentence that names the first pair and the likely cause.
     """
-    wrong, gone = passed_through(mesh, design, r, gradient, free)
+    wrong, gone = passed_through(mesh, design, r, gradient, free_edges)
     pairs = wrong if len(wrong) else gone
     if not len(pairs):
         return
@@ -46,7 +46,9 @@ def check_sides(
     raise PenetrationError(f"{pair_label(mesh, first, second)} {what}{others}; {cause}", history)
 
 
-def passed_through(mesh: FibrilMesh, design: Design, r: Floats, gradient: Floats, free: str = "") -> tuple[Ints, Ints]:
+def passed_through(
+    mesh: FibrilMesh, design: Design, r: Floats, gradient: Floats, free_edges: str = ""
+) -> tuple[Ints, Ints]:
     """The pairs (K, 2) of fibrils that are not on the sides of one another that the draft says, and those that left it.
 
     Parallel ones are compared with the start, which is that of the mesh. The lines are seen in its plane, to which the
@@ -57,8 +59,8 @@ def passed_through(mesh: FibrilMesh, design: Design, r: Floats, gradient: Floats
     start, now = _lines(mesh, table, mesh.position, REST), _lines(mesh, table, r, gradient)
     wrong, gone = against_draft(woven(now), np.array(design.weave.draft), mesh.yarn)
     parallel = changed(beside(start), beside(now))
-    held = axis[parallel[:, 0]] != ("x", "y", "").index(free)
-    return np.concatenate([wrong, parallel[held]]), gone[: 0 if free else None]
+    held = axis[parallel[:, 0]] != ("x", "y", "").index(free_edges)
+    return np.concatenate([wrong, parallel[held]]), gone[: 0 if free_edges else None]
 
 
 def _lines(mesh: FibrilMesh, table: CurveTable, r: Floats, gradient: Floats) -> Lines:

@@ -38,14 +38,14 @@ class QuantityError:
     """With twice as many contact points an element, in `unit`; nan likewise."""
 
     @property
-    def order(self) -> float:
+    def observed_order(self) -> float:
         """Observed order of convergence with the mesh; nan where the three values do not approach a limit."""
         return observed_order(self.coarse, self.value, self.fine)
 
     @property
     def regular(self) -> bool:
         """Whether the mesh part rests on Richardson's extrapolation rather than on bare differences."""
-        return self.order >= LEAST_ORDER
+        return self.observed_order >= LEAST_ORDER
 
     @property
     def mesh(self) -> float:
@@ -82,12 +82,13 @@ class ErrorEstimate:
     """(3,) largest distance of a node from where the state has it, mm, in the repeated equilibrium on the coarse
     mesh, on the fine one, and with more contact points; nan where there is none."""
     quantities: tuple[QuantityError, ...]
-    """Clamp forces, probe currents, Ry and Rc."""
+    """Clamp forces, probe currents, Ry and Rc; where there are several kinds, of each."""
     warnings: tuple[str, ...]
     """What limits the estimate; empty if all is well."""
 
     def quantity(self, name: str) -> QuantityError:
-        """The quantity of that name: 'Fx warp', 'Fy weft', 'I ' with the name of a probe, 'Ry' or 'Rc'."""
+        """The quantity of that name: 'Fx warp', 'Fy weft', 'I ' with the name of a probe, 'Ry' or 'Rc', with the kind
+        behind it where there are several."""
         return {quantity.name: quantity for quantity in self.quantities}[name]
 
 
@@ -118,11 +119,11 @@ def mesh_error(coarse: float, value: float, fine: float) -> float:
     coarser, finer = abs(coarse - value), abs(value - fine)
     if not isfinite(finer):
         return nan
-    order = observed_order(coarse, value, fine)
-    if LEAST_ORDER <= order <= FORMAL_ORDER:
-        return SAFETY * finer / (1.0 - exp2(-order))
+    observed = observed_order(coarse, value, fine)
+    if LEAST_ORDER <= observed <= FORMAL_ORDER:
+        return SAFETY * finer / (1.0 - exp2(-observed))
     second_order = SAFETY * coarser / (exp2(FORMAL_ORDER) - 1.0) if isfinite(coarser) else 0.0
-    return second_order if order > FORMAL_ORDER else max(CAUTION * finer, second_order)
+    return second_order if observed > FORMAL_ORDER else max(CAUTION * finer, second_order)
 
 
 def contact_error(value: float, more_points: float) -> float:

@@ -18,7 +18,7 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
 from circuittex.results.bifurcation import BranchCheck
 from circuittex.results.discretisation import ErrorEstimate
-from circuittex.results.outcome import Outcome
+from circuittex.results.outcome import Outcome, outcome
 from circuittex.results.verification import Verification
 
 
@@ -89,7 +89,7 @@ class Record:
     @property
     def outcome(self) -> Outcome:
         """The numbers by which equilibria are told apart."""
-        return Outcome(self.clamp_force, self.currents, self.fit.Ry, self.fit.Rc, self.energy)
+        return outcome(self.clamp_force, self.currents, self.fit, self.energy)
 
     @property
     def peak_temperature(self) -> float:

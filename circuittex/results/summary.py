@@ -1,9 +1,9 @@
 """summary.json: the numbers of a study for programs, and the table at the end of a run.
 
-The file is strict JSON; a number that is undefined (nan) or infinite is null. Keys of version 1:
+The file is strict JSON; a number that is undefined (nan) or infinite is null. Keys of version 2:
 
 ``format``
-    1. A change that would break readers of the file gives a new number; new keys do not.
+    2. A change that would break readers of the file gives a new number; new keys do not.
 ``version``, ``design``, ``design_hash``
     version of circuittex, name of the design, and the hash that also stands in the netlists
 ``parameters``
@@ -11,11 +11,11 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
 ``probes``
     names of the probes, in the order of every list of currents
 ``insulated_Ry_ohm``
-    resistance of a yarn segment without contacts [57]
+    resistance of a yarn segment without contacts [57]; the mean over the conducting yarns
 ``states``
     one object for each recorded state, in the order of computation:
 
-    ``name``, ``path``, ``strain``
+    ``name``, ``loading``, ``strain``
         name of the state, its loading path (empty for the relaxed state), and the strain that labels it
     ``gradient``
         2 x 2 average in-plane deformation gradient from the relaxed state
@@ -32,7 +32,10 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
     ``currents_A``, ``peak_temperature_K``
         current of each probe, and the largest temperature rise over all probes
     ``Ry_ohm``, ``Rc_ohm``, ``fit_residual``, ``fit_warnings``, ``network``, ``ports``
-        the reduced network, its misfit, and what the fit warns of
+        the reduced network, its misfit, and what the fit warns of; ``Ry_ohm`` is null where there are several kinds of
+        yarn, ``network`` has ``fitted_to``, ``Ry_ohm`` of each kind, ``Rc_ohm`` of each pair of kinds that cross,
+        ``insulated_Ry_ohm`` of each kind without contacts, ``Rc_of_crossings_ohm``, and ``worst_pair_error`` and
+        ``median_pair_error`` of the resistances between all yarn ends; ``ports`` is the exact port matrix
     ``contact_points``, ``levels``
         contact points at full resolution; levels in which the fibrils of the centre warp yarn lie at its centre
         crossing
@@ -54,7 +57,7 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
         relative, ``energy_difference_N_mm``, ``moved_mm``: the largest distance of a node from its place in the state,
         ``settled_difference``: the larger relative difference when both were relaxed further (null where they were
         not), ``trouble``: why something did not converge, and the other branch: ``clamp_force_N``, ``currents_A``,
-        ``Ry_ohm``, ``Rc_ohm``, ``stored_energy_N_mm``
+        ``Ry_ohm``, ``Rc_ohm``, ``network_ohm``: by kind, ``stored_energy_N_mm``
     ``verification``
         ``routes``: the routes that answered; ``max_voltage_difference_V``: the largest difference of two routes in a
         node voltage, V per volt of the probe; ``max_current_difference``: in a terminal current, relative;
@@ -71,6 +74,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -79,6 +83,7 @@ import numpy as np
 
 from circuittex.base.arrays import Floats
 from circuittex.base.atomic import write_text
+from circuittex.design import Design
 from circuittex.fit import Fit
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results.bifurcation import BranchCheck, branch_statement, current_difference, force_difference
@@ -123,20 +128,18 @@ def table(study: Study) -> str:
     After it what the study took, what the branch checks found, which states to doubt, and whether ngspice confirmed it.
     A blank line parts the loading paths."""
     head = ["state", "Fx warp N", "Fy weft N", *(f"{probe.name} A" for probe in study.design.probes)]
-    rows = [[*head, *_resistances(study), "overlap", "iterations", "routes differ"]]
+    rows = [[*head, *(f"{name} ohm" for name in network_names(study)), "overlap", "iterations", "routes differ"]]
     loading = ""
     for record in study.records:
         if record.loading != loading:
             rows.append([""] * len(rows[0]))
             loading = record.loading
-        network = record.fit.kind_resistance, record.fit.pair_resistance
-        numbers = [record.clamp_force[0, 0], record.clamp_force[1, 1], *record.currents, *np.concatenate(network)]
+        force = record.clamp_force
+        numbers = [force[0, 0], force[1, 1], *record.currents, *record.outcome.network]
         rows.append([record.name, *(f"{number:#.4g}" if number == number else "-" for number in numbers)])
         rows[-1] += [f"{deepest_overlap(record.contacts)[0]:.2f}", str(record.iterations), f"{difference(record):.1e}"]
         if (error := study.error_of(record.name)) is not None:
-            cells = [_percent(quantity.relative) for quantity in error.quantities]
-            if len(cells) + 4 != len(rows[0]):  # estimated are the network's Ry and Rc as one number each
-                cells = [*cells[:-2], *["-"] * (len(rows[0]) - len(cells) - 2)]
+            cells = (_percent(quantity.relative) for quantity in error.quantities)
             rows.append(["  estimated error", *cells, "", "", ""])
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
@@ -160,13 +163,13 @@ def table(study: Study) -> str:
     )
 
 
-def _resistances(study: Study) -> list[str]:
-    """Heads of the columns of Ry and Rc: by kind where there are several."""
+def network_names(study: Study) -> tuple[str, ...]:
+    """Names of the resistances of the reduced networks, in the order of `Outcome.network`: by kind where there are
+    several."""
     if not study.records:
-        return ["Ry ohm", "Rc ohm"]
+        return "Ry", "Rc"
     fit = study.records[0].fit
-    kinds = [f"Ry {kind} ohm" for kind in fit.kinds] if len(fit.kinds) > 1 else ["Ry ohm"] * len(fit.kinds)
-    return kinds + ([f"Rc {pair} ohm" for pair in fit.pairs] if len(fit.pairs) > 1 else ["Rc ohm"] * len(fit.pairs))
+    return *fit.segments_by_name, *fit.crossings_by_name
 
 
 def network_statement(study: Study) -> tuple[str, ...]:
@@ -262,19 +265,42 @@ def difference(record: Record) -> float:
 
 
 def insulated_resistance(mesh: FibrilMesh) -> float:
-    """Ry of a yarn segment between two crossings without contacts [57], ohm; the mean over the conducting yarns.
-
-    A yarn is its fibrils in parallel, Ry = 1 / (n sum sigma A / L), with n crossings along it; inf where none conducts.
+    """Ry of a yarn segment between two crossings without contacts [57], ohm; the mean over the conducting yarns, inf
+    where none conducts.
 
     >>> from circuittex.design import plain_weave
     >>> from circuittex.geometry.weave import build_mesh
     >>> round(insulated_resistance(build_mesh(plain_weave())), 4)
     0.2829
     """
+    ohms = insulated_segments(mesh)
+    return float(np.mean(ohms[np.isfinite(ohms)])) if np.isfinite(ohms).any() else math.inf
+
+
+def insulated_segments(mesh: FibrilMesh) -> Floats:
+    """(warp + weft,) the same for each yarn, inf where it does not conduct.
+
+    A yarn is its fibrils in parallel, Ry = 1 / (n sum sigma A / L), with n crossings along it.
+    """
     conductance = np.bincount(mesh.yarn, mesh.electrical_conductivity * mesh.area / mesh.length, len(mesh.yarn_names))
     crossings = np.array([np.count_nonzero(mesh.yarn_axis != axis) for axis in mesh.yarn_axis])
-    conducts = conductance > 0.0
-    return float(np.mean(1.0 / (conductance * np.maximum(crossings, 1))[conducts])) if conducts.any() else math.inf
+    whole = np.full(len(conductance), np.inf)
+    np.divide(1.0, conductance * np.maximum(crossings, 1), out=whole, where=conductance > 0.0)
+    return whole
+
+
+def insulated_resistances(design: Design, mesh: FibrilMesh, names: Sequence[str]) -> dict[str, float]:
+    """The same for each Ry among the `names` of a reduced network's resistances."""
+    segments = [name for name in names if name.startswith("Ry")]
+    if len(segments) == 1:
+        return {segments[0]: insulated_resistance(mesh)}
+    ohms: dict[str, list[float]] = {name: [] for name in segments}
+    directions = ["warp"] * len(design.weave.warp) + ["weft"] * len(design.weave.weft)
+    for yarn, direction, ohm in zip(design.weave.yarns, directions, insulated_segments(mesh), strict=True):
+        for name in (f"Ry {yarn.name}", f"Ry {yarn.name} {direction}"):
+            if name in ohms:
+                ohms[name].append(float(ohm))
+    return {name: float(np.mean(values)) for name, values in ohms.items()}
 
 
 def _state(study: Study, record: Record, step: EnergyBalance | None) -> dict[str, Any]:
@@ -282,7 +308,7 @@ def _state(study: Study, record: Record, step: EnergyBalance | None) -> dict[str
     error, check = study.error_of(record.name), study.check_of(record.name)
     return {
         "name": record.name,
-        "path": record.loading,
+        "loading": record.loading,
         "strain": record.strain,
         "gradient": record.gradient,
         "residual_N": record.residual,
@@ -299,7 +325,7 @@ def _state(study: Study, record: Record, step: EnergyBalance | None) -> dict[str
         "Rc_ohm": record.fit.Rc,
         "fit_residual": record.fit.residual,
         "fit_warnings": record.fit.warnings,
-        "network": _network(record.fit),
+        "network": _network(study, record.fit),
         "ports": {"names": record.ports.ports, "conductance_S": record.ports.conductance},
         "contact_points": record.contacts.n_contacts,
         "levels": record.levels,
@@ -308,7 +334,7 @@ def _state(study: Study, record: Record, step: EnergyBalance | None) -> dict[str
         "doubts": [doubt.text for doubt in doubts(study, record)],
         "netlist": record.netlist,
         "error_estimate": None if error is None else _error_estimate(error),
-        "branch_check": None if check is None else _branch_check(check),
+        "branch_check": None if check is None else _branch_check(check, network_names(study)),
         "verification": {
             "routes": verification.routes,
             "max_voltage_difference_V": verification.max_voltage_difference,
@@ -326,12 +352,14 @@ def _state(study: Study, record: Record, step: EnergyBalance | None) -> dict[str
     }
 
 
-def _network(fit: Fit) -> dict[str, Any]:
+def _network(study: Study, fit: Fit) -> dict[str, Any]:
     worst, median = fit.pair_errors
+    insulated = insulated_resistances(study.design, study.mesh, network_names(study)).values()
     return {
         "fitted_to": fit.method,
         "Ry_ohm": dict(zip(fit.kinds, fit.kind_resistance.tolist(), strict=True)),
         "Rc_ohm": dict(zip(fit.pairs, fit.pair_resistance.tolist(), strict=True)),
+        "insulated_Ry_ohm": dict(zip(fit.kinds, insulated, strict=bool(fit.kinds))),
         "Rc_of_crossings_ohm": fit.crossings,
         "worst_pair_error": worst,
         "median_pair_error": median,
@@ -353,7 +381,7 @@ def _error_estimate(error: ErrorEstimate) -> dict[str, Any]:
                 "relative_error": quantity.relative,
                 "mesh_error": quantity.mesh,
                 "contact_error": quantity.contact,
-                "order": quantity.order,
+                "order": quantity.observed_order,
                 "coarse": quantity.coarse,
                 "fine": quantity.fine,
                 "more_points": quantity.more_points,
@@ -363,7 +391,7 @@ def _error_estimate(error: ErrorEstimate) -> dict[str, Any]:
     }
 
 
-def _branch_check(check: BranchCheck) -> dict[str, Any]:
+def _branch_check(check: BranchCheck, names: Sequence[str]) -> dict[str, Any]:
     again = check.again
     return {
         "verdict": str(check.verdict),
@@ -378,6 +406,7 @@ def _branch_check(check: BranchCheck) -> dict[str, Any]:
         "currents_A": again.currents,
         "Ry_ohm": again.Ry,
         "Rc_ohm": again.Rc,
+        "network_ohm": dict(zip(names, again.network, strict=False)),  # one of each where there is no equilibrium
         "stored_energy_N_mm": again.energy,
     }
 

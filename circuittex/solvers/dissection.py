@@ -42,13 +42,13 @@ def dissect(graph: sp.csr_array, width: Ints, position: Floats) -> Ints:
     if cut is None:
         return minimum_degree(graph)
     cut = narrowed(graph, width, cut)
-    orders = []
+    permutations = []
     for block in cut:
         chosen = np.flatnonzero(block)
         within = graph[chosen][:, chosen]
-        order = minimum_degree(within) if block is cut[-1] else dissect(within, width[chosen], position[chosen])
-        orders.append(chosen[order])
-    return np.concatenate(orders)
+        permutation = minimum_degree(within) if block is cut[-1] else dissect(within, width[chosen], position[chosen])
+        permutations.append(chosen[permutation])
+    return np.concatenate(permutations)
 
 
 def _best_cut(graph: sp.csr_array, width: Ints, position: Floats) -> list[NDArray[np.bool_]] | None:

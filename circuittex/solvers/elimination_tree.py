@@ -128,7 +128,7 @@ def _take_in(above: Any, p: Any, b: Any, front: float, addition: float) -> Any:
                 _append(head, tail, sibling, k, first, last)
         if above[k] >= 0:
             _append(head, tail, sibling, above[k], k, k)
-    order, end, waiting = np.empty(n, np.int64), n, 0
+    permutation, end, waiting = np.empty(n, np.int64), n, 0
     for k in range(n):
         if above[k] < 0:
             below[waiting], waiting = k, waiting + 1
@@ -136,10 +136,10 @@ def _take_in(above: Any, p: Any, b: Any, front: float, addition: float) -> Any:
         waiting -= 1
         k = below[waiting]
         end -= 1
-        order[end], c = k, head[k]
+        permutation[end], c = k, head[k]
         while c >= 0:
             below[waiting], waiting, c = c, waiting + 1, sibling[c]
-    return taken, order[end:]
+    return taken, permutation[end:]
 
 
 @compiled

@@ -10,7 +10,7 @@ Ordering and elimination are followed in *blocks* of unknowns that have the same
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -53,7 +53,7 @@ class Front:
 class Analysis:
     """What a factorisation needs to know besides the values."""
 
-    order: Ints
+    permutation: Ints
     """(n_dofs,) unknowns in the order of elimination."""
     fronts: tuple[Front, ...]
     """in the order of elimination: each comes after those below it."""
@@ -95,6 +95,19 @@ class Entries:
     """the places that count, rising."""
 
 
+class Layout(NamedTuple):
+    """Where fronts begin and end, as compiled functions take them."""
+
+    first: Ints
+    """(K,) first pivot of each front."""
+    pivots: Ints
+    """(K,) how many pivots it has."""
+    cut: Ints
+    """(K + 1,) where its border begins in `border`."""
+    border: Ints
+    """the unknowns of all borders."""
+
+
 def analyse(blocks: Blocks, entries: Entries, last: Analysis | None = None) -> Analysis:
     """The order of elimination and the fronts of a matrix.
 
@@ -108,8 +121,8 @@ def analyse(blocks: Blocks, entries: Entries, last: Analysis | None = None) -> A
     by_front = np.argsort(front_of_turn, kind="stable")
     taken, turn = taken[by_front], np.argsort(by_front)
     width = width[taken]
-    order = ranges(blocks.first[taken], width)
-    place, front_of = np.argsort(order), np.repeat(front_of_turn[by_front], width)
+    permutation = ranges(blocks.first[taken], width)
+    place, front_of = np.argsort(permutation), np.repeat(front_of_turn[by_front], width)
     p = np.bincount(front_of)
     first = np.cumsum(p) - p
 
@@ -125,7 +138,8 @@ def analyse(blocks: Blocks, entries: Entries, last: Analysis | None = None) -> A
     above = np.full(len(p), -1)
     above[b > 0] = front_of[border[cut[:-1][b > 0]]]
     places = np.empty(len(border), dtype=np.int64)
-    _find(above[owner], border, first, p, cut, border, places)
+    layout = Layout(first, p, cut, border)
+    _find(above[owner], border, layout, places)
     breaks = (np.diff(places, prepend=-2) != 1) | (places == p[above[owner]])
     breaks[cut[:-1][b > 0]] = True
     runs = np.flatnonzero(breaks)
@@ -149,9 +163,9 @@ def analyse(blocks: Blocks, entries: Entries, last: Analysis | None = None) -> A
         for k in range(len(p))
     )
     target = np.empty(len(entries.used), dtype=np.int64)
-    _locate(entries.used, entries.indptr, entries.indices, place, front_of, first, p, cut, border, start, target)
+    _locate(entries.used, entries.indptr, entries.indices, place, front_of, layout, start, target)
     return Analysis(
-        order=order,
+        permutation=permutation,
         fronts=fronts,
         target=target,
         size=int(size.sum()),
@@ -173,8 +187,9 @@ def _ordered(blocks: Blocks, last: Analysis | None) -> tuple[EliminationTree, fl
 
 
 @compiled
-def _find(front: Any, unknown: Any, first: Any, pivots: Any, cut: Any, border: Any, found: Any) -> None:
+def _find(front: Any, unknown: Any, layout: Any, found: Any) -> None:
     """Fill found with where unknowns are in fronts: among the pivots, or in the border behind them."""
+    first, pivots, cut, border = layout
     for k in range(front.shape[0]):
         f = front[k]
         found[k] = unknown[k] - first[f]
@@ -184,22 +199,13 @@ def _find(front: Any, unknown: Any, first: Any, pivots: Any, cut: Any, border: A
 
 @compiled
 def _locate(
-    entries: Any,
-    indptr: Any,
-    indices: Any,
-    place: Any,
-    front_of: Any,
-    first: Any,
-    pivots: Any,
-    cut: Any,
-    border: Any,
-    start: Any,
-    target: Any,
+    entries: Any, indptr: Any, indices: Any, place: Any, front_of: Any, layout: Any, start: Any, target: Any
 ) -> None:
     """Fill target with where the entries of the matrix belong in the factor.
 
     What comes next in a row is mostly the next unknown in the same front, or of the same unknown.
     """
+    first, pivots, cut, border = layout
     row, f, column, at = 0, -1, -1, -1
     for k in range(entries.shape[0]):
         while entries[k] >= indptr[row + 1]:

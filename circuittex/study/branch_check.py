@@ -18,7 +18,7 @@ from circuittex.base.errors import ConvergenceError
 from circuittex.base.workers import Job
 from circuittex.design import Design
 from circuittex.geometry.mesh import FibrilMesh
-from circuittex.geometry.order import reordered
+from circuittex.geometry.permutation import permuted
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.relaxation.relax import relax
@@ -29,20 +29,20 @@ from circuittex.study.plan import Step, plan
 from circuittex.study.record import outcome_of, reach
 
 SEED = 1
-"""Of the other order; any will do, and a fixed one makes the check repeatable."""
+"""Of the permutation; any will do, and a fixed one makes the check repeatable."""
 
 Solver = Callable[[], LinearSolver]
 Say = Callable[[str], None]
 
 
-def another_order(n: int) -> Ints:
+def another_permutation(n: int) -> Ints:
     """(n,) the numbers below n in an order that is always the same one and, from two on, not their own.
 
-    >>> another_order(5).tolist(), another_order(2).tolist()
+    >>> another_permutation(5).tolist(), another_permutation(2).tolist()
     ([4, 0, 1, 2, 3], [1, 0])
     """
-    order = np.random.default_rng(SEED).permutation(n)
-    return order if np.any(order != np.arange(n)) else order[::-1]
+    permutation = np.random.default_rng(SEED).permutation(n)
+    return permutation if np.any(permutation != np.arange(n)) else permutation[::-1]
 
 
 def without_check(study: Study) -> tuple[Record, ...]:
@@ -70,11 +70,11 @@ def check_branch(
 
     Of `study` only design, mesh and initial configuration are read. Where the two differ by more than `ALLOWED` and
     one of them has a residual that could explain it, both are relaxed on until it cannot (`SETTLED`). A repeat without
-    equilibrium is a finding and no error. `solver` makes the linear solver of each relaxation; `say` is told of the
+    equilibrium is a result and no error. `solver` makes the linear solver of each relaxation; `say` is told of the
     progress.
     """
     mesh, design = study.mesh, study.design
-    other, nodes = reordered(mesh, another_order(mesh.n_fibrils))
+    other, nodes = permuted(mesh, another_permutation(mesh.n_fibrils))
     shuffled = replace(study, mesh=other, initial=Configuration(study.initial.x[nodes]))
     try:
         found = reach(
@@ -110,4 +110,4 @@ def _settle(
     if tolerance == 0.0:
         raise ConvergenceError("the clamps carry no force that the residual could be measured by")
     sharp = replace(design, numerics=replace(design.numerics, tolerance=f"{tolerance!r} N"))
-    return outcome_of(sharp, mesh, relax(mesh, sharp, state, free=step.free, solver=solver))
+    return outcome_of(sharp, mesh, relax(mesh, sharp, state, free_edges=step.free_edges, solver=solver))

@@ -13,6 +13,7 @@ from circuittex.base.errors import ConvergenceError, DesignError
 from circuittex.base.frozen import frozen
 from circuittex.base.workers import Job
 from circuittex.design import Design
+from circuittex.fit import network_names
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration
@@ -38,7 +39,7 @@ class _Repeat:
     """What one variant of the numerics says about a state; all nan where it has no equilibrium."""
 
     values: Floats
-    """(n,) clamp forces N, probe currents A, Ry and Rc ohm."""
+    """(n,) clamp forces N, probe currents A, Ry and Rc by kind ohm."""
     moved: float
     """Largest distance of a node from its place in the state, mm."""
     trouble: str
@@ -78,7 +79,7 @@ def estimate_error(
     solver: Callable[[], LinearSolver] = MultifrontalSolver,
     say: Callable[[str], None] | None = None,
 ) -> ErrorEstimate:
-    """The discretisation error of clamp forces, probe currents, Ry and Rc of a recorded state.
+    """The discretisation error of clamp forces, probe currents, Ry and Rc (by kind) of a recorded state.
 
     The equilibrium found is carried over to each variant of the numerics and relaxed from there, so that it stays on
     its branch: several equilibria of a weave lie close together, and a relaxation from the start could find another.
@@ -87,12 +88,12 @@ def estimate_error(
 
     Raises `DesignError` as `variants` does.
     """
-    free = next((loading.free for loading in design.loading if loading.name == record.loading), "")
+    free_edges = next((loading.free for loading in design.loading if loading.name == record.loading), "")
     repeats = []
     for words, other in zip(VARIANTS, variants(design), strict=True):
         if say is not None:
             say(f"{record.name}: error estimate, {words}")
-        repeats.append(_repeat(other, mesh, record.configuration, free, solver()))
+        repeats.append(_repeat(other, mesh, record.configuration, free_edges, solver()))
     own = _values(record.outcome)
     rows = zip(_names(design), own, *(repeat.values for repeat in repeats), strict=True)
     elements, points = design.resolution.elements, design.resolution.contact_points
@@ -123,11 +124,11 @@ def estimates(study: Study, solver: Callable[[], LinearSolver]) -> list[Job]:
     return [(record.name, estimate_error, (*arguments, record, solver)) for record in without_estimate(study)]
 
 
-def _repeat(design: Design, mesh: FibrilMesh, state: Configuration, free: str, solver: LinearSolver) -> _Repeat:
+def _repeat(design: Design, mesh: FibrilMesh, state: Configuration, free_edges: str, solver: LinearSolver) -> _Repeat:
     """Relax the state with the numerics of `design`, and measure what comes out."""
     other = build_mesh(design)
     try:
-        found = relax(other, design, transfer(state, mesh, other), free=free, solver=solver)
+        found = relax(other, design, transfer(state, mesh, other), free_edges=free_edges, solver=solver)
     except ConvergenceError as error:
         return _Repeat(np.full(len(_names(design)), nan), nan, str(error))
     back = transfer(found.configuration, other, mesh)
@@ -138,13 +139,15 @@ def _repeat(design: Design, mesh: FibrilMesh, state: Configuration, free: str, s
 def _names(design: Design) -> tuple[tuple[str, str], ...]:
     """Name and unit of each quantity, in the order of `_values`."""
     currents = [(f"I {probe.name}", "A") for probe in design.probes]
-    return ("Fx warp", "N"), ("Fy weft", "N"), *currents, ("Ry", "ohm"), ("Rc", "ohm")
+    ohms = [(name, "ohm") for names in network_names(design) for name in names]
+    return ("Fx warp", "N"), ("Fy weft", "N"), *currents, *ohms
 
 
 def _values(outcome: Outcome) -> Floats:
-    """(n,) the quantities: clamp force of the warp along x and of the weft along y, probe currents, Ry, Rc."""
+    """(n,) the quantities: clamp force of the warp along x and of the weft along y, probe currents, Ry and Rc by
+    kind."""
     force = outcome.clamp_force
-    return np.array([force[0, 0], force[1, 1], *outcome.currents, outcome.Ry, outcome.Rc])
+    return np.array([force[0, 0], force[1, 1], *outcome.currents, *outcome.network])
 
 
 def _warnings(mesh: FibrilMesh, repeats: Sequence[_Repeat]) -> Iterator[str]:

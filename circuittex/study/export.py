@@ -12,9 +12,10 @@ from circuittex.base.atomic import write_text
 from circuittex.contact.merge import Simplified, simplify
 from circuittex.contact.state import ContactState
 from circuittex.design import Design, Probe, design_hash
-from circuittex.electrical.network.circuit import Circuit, build_circuit, yarn_end_terminals
+from circuittex.electrical.network.circuit import with_ports
 from circuittex.fit import Fit
 from circuittex.netlist import Header, deck, subcircuit
+from circuittex.study.circuits import StateCircuits
 
 JOINED = "every yarn end is one pin that joins its fibrils; the probe decks join those of their two terminals only"
 
@@ -30,29 +31,23 @@ def simplified(design: Design, contacts: ContactState, *, merge_length: float | 
     )
 
 
-def detailed_circuit(simple: Simplified) -> Circuit:
-    """Fibril segments and contacts, with one port for each yarn end."""
-    terminals = yarn_end_terminals(simple.contacts.mesh)
-    return build_circuit(simple.contacts, terminals, dropped_contacts=simple.dropped_contacts)
-
-
-def detailed_netlist(design: Design, state: str, simple: Simplified, *, merge_length: float | None = None) -> str:
-    """The `.subckt` of `detailed_circuit`; `merge_length` as it was given to `simplified`, for the header."""
-    notes = (JOINED, *_simplification(design, simple, merge_length))
+def detailed_netlist(design: Design, state: str, circuits: StateCircuits, *, merge_length: float | None = None) -> str:
+    """The `.subckt` with a pin for each yarn end; `merge_length` as it was given to `simplified`, for the header."""
+    notes = (JOINED, *_simplification(design, circuits.simple, merge_length))
     header = _header(design, state)("detailed resistor network of fibril segments and contacts", notes=notes)
-    return subcircuit(detailed_circuit(simple), f"{state_word(state)} {design.name}", header)
+    return subcircuit(circuits.yarn_ends, f"{state_word(state)} {design.name}", header)
 
 
 def probe_netlist(
-    design: Design, state: str, simple: Simplified, probe: Probe, *, merge_length: float | None = None
+    design: Design, state: str, circuits: StateCircuits, probe: Probe, *, merge_length: float | None = None
 ) -> str:
     """A runnable deck of the detailed network as one probe sees it: all other fibril ends insulated one by one.
 
     `merge_length` as it was given to `simplified`, for the header.
     """
-    terminals = [terminal for terminal in design.terminals if terminal.name in (probe.source, probe.sink)]
-    circuit = build_circuit(simple.contacts, terminals, dropped_contacts=simple.dropped_contacts)
-    notes = _simplification(design, simple, merge_length)
+    pins = [terminal.name for terminal in design.terminals if terminal.name in (probe.source, probe.sink)]
+    circuit = with_ports(circuits.of(probe), pins)
+    notes = _simplification(design, circuits.simple, merge_length)
     header = _header(design, state)(f"detailed resistor network, probe {probe.name}", notes=notes)
     return deck(circuit, {probe.source: probe.voltage, probe.sink: 0.0}, header)
 
@@ -103,11 +98,11 @@ def netlist_files(design: Design, state: str, fit: Fit | None) -> tuple[str, ...
     return (detailed_file(state), *decks, *reduced)
 
 
-def write_netlists(folder: Path, design: Design, state: str, simple: Simplified, fit: Fit | None) -> Path:
+def write_netlists(folder: Path, design: Design, state: str, circuits: StateCircuits, fit: Fit | None) -> Path:
     """Write all netlists of a state into `folder`; returns the path of the detailed sub-circuit."""
     folder.mkdir(parents=True, exist_ok=True)
-    texts = [detailed_netlist(design, state, simple)]
-    texts += [probe_netlist(design, state, simple, probe) for probe in design.probes]
+    texts = [detailed_netlist(design, state, circuits)]
+    texts += [probe_netlist(design, state, circuits, probe) for probe in design.probes]
     files = netlist_files(design, state, fit)
     if fit is not None and len(files) > len(texts):
         texts.append(reduced_netlist(design, state, fit))

@@ -20,6 +20,7 @@ from circuittex.results.store import (
 )
 from circuittex.results.summary import write_summary
 from circuittex.results.vtk.vtu import write_collections, write_vtu
+from circuittex.study.circuits import StateCircuits, state_circuits
 from circuittex.study.export import netlist_files, simplified, write_netlists
 
 MARKS = {
@@ -95,12 +96,17 @@ def keep_examination(folder: Path, study: Study, examination: Examination) -> St
     return with_examination(study, examination)
 
 
-def write_state(folder: Path, study: Study, record: Record) -> None:
-    """The netlists and the VTU file of one state, those that are not there yet."""
-    files = netlist_files(study.design, record.name, record.fit)
+def write_state(folder: Path, study: Study, record: Record, circuits: StateCircuits | None = None) -> None:
+    """The netlists and the VTU file of one state, those that are not there yet.
+
+    The `circuits` are those that were built when it was recorded; they are built anew for a state of an earlier run.
+    """
+    design = study.design
+    files = netlist_files(design, record.name, record.fit)
     if not all((folder / "netlists" / name).exists() for name in files):
-        simple = simplified(study.design, record.contacts)
-        write_netlists(folder / "netlists", study.design, record.name, simple, record.fit)
+        if circuits is None:
+            circuits = state_circuits(simplified(design, record.contacts), design.terminals, design.probes)
+        write_netlists(folder / "netlists", design, record.name, circuits, record.fit)
     vtu = folder / "vtu" / f"{record.name}.vtu"
     if not vtu.exists():
         vtu.parent.mkdir(exist_ok=True)

@@ -32,7 +32,7 @@ class Step:
     """(2, 2) average deformation gradient of the state that it starts from."""
     after: Floats
     """(2, 2) its own average deformation gradient."""
-    free: str
+    free_edges: str
     """Edges that are not held: 'x', 'y' or none."""
 
 
@@ -67,8 +67,8 @@ def state_names(loading: Sequence[Loading]) -> tuple[tuple[str, ...], ...]:
 
     def unique(name: str) -> str:
         choices = (name if number == 1 else f"{name}-{number}" for number in count(1))
-        free = next(choice for choice in choices if state_word(choice) not in taken)
-        taken.add(state_word(free))
-        return free
+        unused = next(choice for choice in choices if state_word(choice) not in taken)
+        taken.add(state_word(unused))
+        return unused
 
     return tuple(tuple(unique(f"{each.name}-{strain:.6g}") for strain in each.strains) for each in loading)

@@ -7,25 +7,28 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from circuittex.base.errors import CircuitError, ConvergenceError, PenetrationError
+from circuittex.base.frozen import frozen
 from circuittex.contact.extract import contacts_of
-from circuittex.design import Design, Terminal
+from circuittex.design import Design
 from circuittex.electrical.fields import Fields, solve_probes
-from circuittex.electrical.network.circuit import Circuit, build_circuit, yarn_end_terminals
+from circuittex.electrical.network.circuit import Circuit, build_circuit
 from circuittex.electrical.network.nodal import solve_nodal
+from circuittex.electrical.network.one_pair import yarn_conductance
 from circuittex.electrical.network.ports import port_matrix
-from circuittex.fit import fit_network, yarn_conductance
+from circuittex.fit import fit_network
 from circuittex.geometry.levels import levels
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.relaxation.increment import Increment, advance
 from circuittex.relaxation.relax import Equilibrium, clamp_force, relax
-from circuittex.results.outcome import Outcome
+from circuittex.results.outcome import Outcome, outcome
 from circuittex.results.records import Record, Study
+from circuittex.study.circuits import StateCircuits, conducting_ends, probe_circuits, state_circuits
 from circuittex.study.export import detailed_file, simplified
 from circuittex.study.plan import Step
 from circuittex.study.soundness import check_sound
-from circuittex.study.verify import field_convergence, probe_circuits, verify
+from circuittex.study.verify import field_convergence, verify
 from circuittex.study.verify_reduced import verify_reduced
 
 SMALL = 1e-6
@@ -62,7 +65,7 @@ def reach(
             start,
             step.before,
             step.after,
-            free=step.free,
+            free_edges=step.free_edges,
             solver=solver(),
             report=report,
             say=lambda text: say(f"{step.name}: {text}\n"),
@@ -81,8 +84,18 @@ def _way_out(design: Design, error: ConvergenceError) -> str:
     return f"; try {other}, a larger numerics.tolerance or smaller steps"
 
 
-def record_state(study: Study, step: Step, reached: Increment, say: Callable[[str], None]) -> Record:
-    """Contacts, fields, circuit, verification and fit of one equilibrium.
+@frozen
+class Recorded:
+    """A recorded state, and the circuits that were built on the way."""
+
+    record: Record
+    """What is kept of it."""
+    circuits: StateCircuits
+    """What its netlists are written from."""
+
+
+def record_state(study: Study, step: Step, reached: Increment, say: Callable[[str], None]) -> Recorded:
+    """Contacts, fields, circuits, verification and fit of one equilibrium.
 
     Raises `PenetrationError`, naming the state, where fibrils passed through one another or overlap too deeply.
     """
@@ -91,14 +104,23 @@ def record_state(study: Study, step: Step, reached: Increment, say: Callable[[st
     contacts = contacts_of(design, mesh, equilibrium.configuration)
     check_sound(study, step, equilibrium.configuration.r, contacts)
     fields = solve_probes(contacts, design.terminals, design.probes, contact_heat=design.electrical.contact_heat)
-    merged = simplified(design, contacts).contacts
-    circuits = probe_circuits(contacts, design.terminals, design.probes)
-    ports = port_matrix(build_circuit(merged, conducting_ends(mesh)))
-    fit = fit_network(_told(fields, circuits, design), design, ports)
+    circuits = state_circuits(simplified(design, contacts), design.terminals, design.probes)
+    whole = probe_circuits(contacts, design.terminals, design.probes)
+    ports = port_matrix(circuits.conducting)
+    fit = fit_network(_told(fields, whole, design), design, ports)
     convergence = np.empty((0, 2))
     if not step.loading:
         convergence = field_convergence(contacts, design.terminals, design.probes, fields)
-    return Record(
+    verification = verify(
+        contacts,
+        circuits.simple.contacts,
+        design.terminals,
+        design.probes,
+        fields=fields,
+        circuits=whole,
+        simplified_circuits=circuits.probes,
+    )
+    record = Record(
         name=step.name,
         loading=step.loading,
         strain=step.strain,
@@ -116,12 +138,13 @@ def record_state(study: Study, step: Step, reached: Increment, say: Callable[[st
         fields=fields,
         fit=fit,
         reduced_difference=verify_reduced(design, fit),
-        verification=verify(contacts, merged, design.terminals, design.probes, fields=fields, circuits=circuits),
+        verification=verification,
         field_convergence=convergence,
         levels=levels(mesh, equilibrium.configuration.r, *centre_crossing(design)),
         netlist=f"netlists/{detailed_file(step.name)}",
         ports=ports,
     )
+    return Recorded(record, circuits)
 
 
 def _told(fields: Sequence[Fields], circuits: Sequence[Circuit], design: Design) -> list[float]:
@@ -141,13 +164,6 @@ def _told(fields: Sequence[Fields], circuits: Sequence[Circuit], design: Design)
     return currents
 
 
-def conducting_ends(mesh: FibrilMesh) -> tuple[Terminal, ...]:
-    """A terminal for each end of a yarn that conducts."""
-    conducts = np.bincount(mesh.yarn, mesh.electrical_conductivity, len(mesh.yarn_names)) > 0.0
-    named = dict(zip(mesh.yarn_names, conducts, strict=True))
-    return tuple(terminal for terminal in yarn_end_terminals(mesh) if named[terminal.ends[0][0]])
-
-
 def outcome_of(design: Design, mesh: FibrilMesh, equilibrium: Equilibrium) -> Outcome:
     """The numbers of an equilibrium and nothing else, for one that is not recorded."""
     contacts = contacts_of(design, mesh, equilibrium.configuration)
@@ -155,7 +171,7 @@ def outcome_of(design: Design, mesh: FibrilMesh, equilibrium: Equilibrium) -> Ou
     currents = tuple(float(field.currents[0]) for field in fields)
     merged = simplified(design, contacts).contacts
     fit = fit_network(currents, design, port_matrix(build_circuit(merged, conducting_ends(mesh))))
-    return Outcome(clamp_force(mesh, equilibrium.reaction), currents, fit.Ry, fit.Rc, equilibrium.energy)
+    return outcome(clamp_force(mesh, equilibrium.reaction), currents, fit, equilibrium.energy)
 
 
 def centre_crossing(design: Design) -> tuple[int, float]:

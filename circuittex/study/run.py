@@ -19,7 +19,7 @@ from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.mech.multifrontal import MultifrontalSolver
-from circuittex.results.records import Examination, Record, Study, with_examination
+from circuittex.results.records import Examination, Study, with_examination
 from circuittex.study.branch_check import branch_checks
 from circuittex.study.error_estimate import estimates, variants
 from circuittex.study.folder import (
@@ -32,12 +32,12 @@ from circuittex.study.folder import (
     write_state,
 )
 from circuittex.study.plan import RELAXED, plan
-from circuittex.study.record import reach
+from circuittex.study.record import Recorded, reach
 from circuittex.study.rest import Rest
 from circuittex.study.schedule import compute
 
 Say = Callable[[str], None]
-Keep = Callable[[Study, Record], Study]
+Keep = Callable[[Study, Recorded], Study]
 
 
 def run_study(
@@ -114,10 +114,11 @@ def _in_folder(
         say(f"{len(known)} of {len(loading)} states are there already\n")
     rest = Rest(Counter(loading[name] for name in loading if name not in known), len(loading), workers, say)
 
-    def keep(so_far: Study, record: Record) -> Study:
+    def keep(so_far: Study, recorded: Recorded) -> Study:
+        record = recorded.record
         so_far = keep_record(folder, so_far, record)
         rest.done(loading[record.name])
-        write_state(folder, so_far, record)
+        write_state(folder, so_far, record, recorded.circuits)
         write_numbers(folder, so_far)
         return so_far
 
@@ -170,9 +171,9 @@ def _workers(asked: int | None) -> int:
     return available_cores() if asked is None else asked
 
 
-def _with(study: Study, record: Record) -> Study:
+def _with(study: Study, recorded: Recorded) -> Study:
     """The study with one more record."""
-    return replace(study, records=(*study.records, record))
+    return replace(study, records=(*study.records, recorded.record))
 
 
 def _say_nothing(_: str) -> None:

@@ -10,9 +10,9 @@ from circuittex.base.workers import Computers
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.relaxation.increment import Increment
-from circuittex.results.records import Record, Study
+from circuittex.results.records import Study
 from circuittex.study.plan import Step, plan
-from circuittex.study.record import reach, record_state
+from circuittex.study.record import Recorded, reach, record_state
 
 Solver = Callable[[], LinearSolver]
 """Makes a linear solver; a function that pickle finds by its name."""
@@ -22,7 +22,7 @@ def compute(
     study: Study,
     computers: Computers,
     solver: Solver,
-    keep: Callable[[Study, Record], Study],
+    keep: Callable[[Study, Recorded], Study],
     reached: Mapping[str, Increment] | None = None,
 ) -> Study:
     """The study with all states of its design: those that it has stay, the others follow from them.
@@ -46,14 +46,14 @@ class _Computation:
     study: Study
     computers: Computers
     solver: Solver
-    keep: Callable[[Study, Record], Study]
+    keep: Callable[[Study, Recorded], Study]
     steps: dict[str, Step]
     start: dict[str, Configuration] = field(default_factory=dict)
     """States to reach, and where from."""
     reached: dict[str, Increment] = field(default_factory=dict)
     """States to record."""
     running: set[str] = field(default_factory=set)
-    recorded: dict[str, Record] = field(default_factory=dict)
+    recorded: dict[str, Recorded] = field(default_factory=dict)
     """Records that wait for the one before them to be kept."""
     kept: set[str] = field(default_factory=set)
     failures: dict[str, CircuittexError] = field(default_factory=dict)
@@ -112,10 +112,11 @@ class _Computation:
         """Keep the records whose predecessors are kept."""
         for name, step in self.steps.items():
             if step.previous in self.kept and name in self.recorded:
-                record = self.recorded.pop(name)
+                recorded = self.recorded.pop(name)
                 # What comes from another process has brought a copy of the mesh.
-                record = replace(record, contacts=replace(record.contacts, mesh=self.study.mesh))
-                self.study = self.keep(self.study, record)
+                contacts = replace(recorded.record.contacts, mesh=self.study.mesh)
+                recorded = replace(recorded, record=replace(recorded.record, contacts=contacts))
+                self.study = self.keep(self.study, recorded)
                 self.kept.add(name)
 
     def _fail(self, step: Step, error: CircuittexError) -> None:

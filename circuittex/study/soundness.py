@@ -20,7 +20,7 @@ def check_sound(study: Study, step: Step, r: Floats, contacts: ContactState) -> 
     """
     mesh, design = study.mesh, study.design
     try:
-        check_sides(mesh, design, r, step.after, step.free)
+        check_sides(mesh, design, r, step.after, step.free_edges)
     except PenetrationError as error:
         raise PenetrationError(f"{step.name}: {error}") from error
     overlap, first, second = deepest_overlap(contacts)

@@ -15,12 +15,13 @@ from circuittex.base.frozen import frozen
 from circuittex.contact.state import ContactState
 from circuittex.design import Probe, Terminal
 from circuittex.electrical.fields import Fields, Potential, solve_potentials
-from circuittex.electrical.network.circuit import Circuit, build_circuits
+from circuittex.electrical.network.circuit import Circuit
 from circuittex.electrical.network.nodal import rounding_errors, solve_nodal
 from circuittex.electrical.spice.ngspice import run_decks
 from circuittex.geometry.refine import refined
 from circuittex.netlist import deck, pin_names
 from circuittex.results.verification import AGREEMENT, Verification
+from circuittex.study.circuits import probe_circuits
 
 NO_CURRENT = 1e-6
 """A probe with less than this fraction of the largest probe current is measured against the largest."""
@@ -50,6 +51,7 @@ def verify(
     *,
     fields: Sequence[Fields] | None = None,
     circuits: Sequence[Circuit] | None = None,
+    simplified_circuits: Sequence[Circuit] | None = None,
     timeout: float = 60.0,
 ) -> Verification:
     """Compare finite elements, nodal analysis and ngspice for each probe.
@@ -60,8 +62,8 @@ def verify(
     seconds; where it does not, `ngspice_checked` is False and `note` says why. Its double precision is not refined,
     so that the circuit limits what it can confirm (`ngspice_limit`, see `rounding_errors`); the limit never loosens
     the comparison of the other two, which have one of their own where they differ (`native_limit`). `fields` are the
-    finite element solutions on all `contacts` with the mesh "feet" and `circuits` those of the probes on all
-    `contacts`, for whoever has them already.
+    finite element solutions on all `contacts` with the mesh "feet", `circuits` those of the probes on all `contacts`
+    and `simplified_circuits` those on the simplified ones, for whoever has them already.
     """
     if not probes:
         nan = float("nan")
@@ -71,7 +73,7 @@ def verify(
     full = clock("fields", solve_potentials, contacts, terminals, probes) if fields is None else fields
     whole = probe_circuits(contacts, terminals, probes) if circuits is None else circuits
     merged = clock("fields", solve_potentials, simplified, terminals, probes)
-    small = probe_circuits(simplified, terminals, probes)
+    small = probe_circuits(simplified, terminals, probes) if simplified_circuits is None else simplified_circuits
     try:
         full_fields, full_nodal = _native(clock, whole, probes, full)
         answers = _native(clock, small, probes, merged)
@@ -164,16 +166,6 @@ class _Clock:
             return function(*args, **kwargs)
         finally:
             self.seconds[route] += time.perf_counter() - start
-
-
-def _pair(terminals: Sequence[Terminal], probe: Probe) -> list[Terminal]:
-    """Source and sink of a probe."""
-    return [t for name in (probe.source, probe.sink) for t in terminals if t.name == name]
-
-
-def probe_circuits(contacts: ContactState, terminals: Sequence[Terminal], probes: Sequence[Probe]) -> list[Circuit]:
-    """The circuit of each probe: its two terminals are joined, all other fibril ends insulated."""
-    return build_circuits(contacts, [_pair(terminals, probe) for probe in probes])
 
 
 def _native(

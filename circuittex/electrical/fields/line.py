@@ -88,16 +88,16 @@ def _refined_nodes(contacts: ContactState, foot_fibril: Ints, foot_xi: Floats) -
     breaks = mesh.elements[:, 0] if np.any(contacts.axial_factor != 1.0) else np.empty(0, dtype=np.int64)
     fibril = np.concatenate([every, every, mesh.node_fibril[breaks], foot_fibril.ravel()])
     xi = np.concatenate([np.zeros(mesh.n_fibrils), mesh.length, mesh.xi[breaks], foot_xi.ravel()])
-    order = np.lexsort((xi, fibril))
-    same_fibril = np.diff(fibril[order]) == 0
-    apart = np.diff(xi[order]) > ROUNDING * mesh.length[fibril[order[1:]]]
+    permutation = np.lexsort((xi, fibril))
+    same_fibril = np.diff(fibril[permutation]) == 0
+    apart = np.diff(xi[permutation]) > ROUNDING * mesh.length[fibril[permutation[1:]]]
     first = np.concatenate([[True], ~same_fibril | apart])
-    node = np.empty(len(order), dtype=np.int64)
-    node[order] = np.cumsum(first) - 1
-    node_xi = xi[order[first]]
+    node = np.empty(len(permutation), dtype=np.int64)
+    node[permutation] = np.cumsum(first) - 1
+    node_xi = xi[permutation[first]]
     node_xi[node[mesh.n_fibrils : 2 * mesh.n_fibrils]] = mesh.length
     return (
-        fibril[order[first]],
+        fibril[permutation[first]],
         node_xi,
         node_xi[node[-foot_xi.size :]].reshape(foot_xi.shape) if foot_xi.size else foot_xi,
     )

@@ -97,8 +97,8 @@ def outflow(system: System, x: Floats) -> Floats:
     return inside + outside
 
 
-def balance(system: System, load: Floats, value: Floats, free: Ints, anchor: Ints | None = None) -> Floats:
-    """Balance `load` (n, N) in the dofs `free`; elsewhere x is `value` (N,), and 0 where that is nan.
+def balance(system: System, load: Floats, value: Floats, free_dofs: Ints, anchor: Ints | None = None) -> Floats:
+    """Balance `load` (n, N) in the dofs `free_dofs`; elsewhere x is `value` (N,), and 0 where that is nan.
 
     A fibril that hangs on its contacts alone moves as a whole, and where these are ten decades weaker than its
     segments, nothing of them is left in the assembled matrix. `anchor` (N,) names for each dof the one on its fibril
@@ -106,23 +106,23 @@ def balance(system: System, load: Floats, value: Floats, free: Ints, anchor: Int
     cancellation.
     """
     x = np.nan_to_num(np.tile(value, (len(load), 1)))
-    if not len(free):
+    if not len(free_dofs):
         return x
     move, fibrils, jump = _measured(system, anchor)
     # Positive definite, so no pivoting: as fast as COLAMD on the paper's cell, three times as fast on a denser one.
     # Panels and relaxed supernodes double the time on the paper's cell and save none on denser ones.
     factor = splu(
-        (fibrils + _coupling(jump, system.conductance))[free][:, free].tocsc(),
+        (fibrils + _coupling(jump, system.conductance))[free_dofs][:, free_dofs].tocsc(),
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
         panel_size=1,
         relax=1,
         options={"SymmetricMode": True},
     )
-    move = move[free][:, free]
+    move = move[free_dofs][:, free_dofs]
     for _ in range(1 + REFINEMENTS):
         residual = load - np.stack([outflow(system, row) for row in x])
-        x[:, free] += (move @ factor.solve(move.T @ residual[:, free].T)).T
+        x[:, free_dofs] += (move @ factor.solve(move.T @ residual[:, free_dofs].T)).T
     return x
 
 

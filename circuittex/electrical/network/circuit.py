@@ -133,9 +133,9 @@ def _resistors_apart(contacts: ContactState) -> _Apart:
 def _joined(contacts: ContactState, apart: _Apart, terminals: Sequence[Terminal], dropped_contacts: int) -> Circuit:
     """Join the sites of each terminal, and keep what the terminals reach."""
     port_of_site = _join(contacts.mesh, terminals, apart.end_site, len(apart.xi))
-    free = port_of_site < 0
-    inner = np.flatnonzero(free)
-    node = np.where(free, len(terminals) + np.cumsum(free) - 1, port_of_site)
+    unjoined = port_of_site < 0
+    inner = np.flatnonzero(unjoined)
+    node = np.where(unjoined, len(terminals) + np.cumsum(unjoined) - 1, port_of_site)
     pairs = node[apart.site]
     loop = pairs[:, 0] == pairs[:, 1]  # both ends in one terminal: no current
     keep = np.flatnonzero(~loop)
@@ -184,6 +184,29 @@ def reached_part(circuit: Circuit, ports: Iterable[str]) -> Circuit:
         ports=tuple([circuit.ports[i] for i in kept_ports]),
         port_node=number[circuit.port_node[kept_ports]],
         unreached=np.union1d(circuit.unreached, lost).astype(np.int64),
+    )
+
+
+def with_ports(circuit: Circuit, ports: Sequence[str]) -> Circuit:
+    """Return the circuit with its ports, which are the first of its nodes, in another order.
+
+    >>> line = reached_part(reduced_circuit((1, 1), 1.0, np.inf), ["warp1_plus"])
+    >>> turned = with_ports(line, ["warp1_plus", "warp1_minus"])
+    >>> turned.node_names, turned.resistor_nodes.tolist()
+    (('warp1_plus', 'warp1_minus', 'warp1_at_weft1'), [[1, 2], [2, 0]])
+    """
+    if tuple(ports) == circuit.ports:
+        return circuit
+    first = port_nodes(circuit, ports)
+    nodes = np.concatenate([first, np.setdiff1d(np.arange(circuit.n_nodes), first)])
+    return replace(
+        circuit,
+        node_names=tuple([circuit.node_names[i] for i in nodes.tolist()]),
+        node_fibril=circuit.node_fibril[nodes],
+        node_xi=circuit.node_xi[nodes],
+        resistor_nodes=np.argsort(nodes)[circuit.resistor_nodes],
+        ports=tuple(ports),
+        port_node=np.arange(len(first)),
     )
 
 

@@ -55,12 +55,12 @@ def sites(contacts: ContactState, live: Ints) -> tuple[Ints, Floats, Ints, Ints]
             f"a contact foot lies at xi = {float(xi[far])!r} on a fibril that ends at {float(limit[far])!r} mm"
         )
     xi = np.clip(xi, 0.0, limit)
-    order = np.lexsort((xi, fibril))
-    new = np.ones(len(order), dtype=bool)
-    new[1:] = (np.diff(fibril[order]) != 0) | (np.diff(xi[order]) > _APART * limit[order[1:]])
-    site = np.empty(len(order), dtype=np.int64)
-    site[order] = np.cumsum(new) - 1
-    first = order[new]
+    permutation = np.lexsort((xi, fibril))
+    new = np.ones(len(permutation), dtype=bool)
+    new[1:] = (np.diff(fibril[permutation]) != 0) | (np.diff(xi[permutation]) > _APART * limit[permutation[1:]])
+    site = np.empty(len(permutation), dtype=np.int64)
+    site[permutation] = np.cumsum(new) - 1
+    first = permutation[new]
     place = xi[first]
     n = len(live)
     end_site = np.full((mesh.n_fibrils, 2), -1, dtype=np.int64)
@@ -87,11 +87,11 @@ def axial_resistance(contacts: ContactState, fibril: Ints, xi: Floats) -> Floats
     both_fibril = np.concatenate([start_fibril[kept], fibril])
     both_xi = np.concatenate([start_xi[kept], xi])
     is_site = np.arange(len(both_xi)) >= len(kept)
-    order = np.lexsort((is_site, both_xi, both_fibril))
-    is_site = is_site[order]
+    permutation = np.lexsort((is_site, both_xi, both_fibril))
+    is_site = is_site[permutation]
     element = kept[np.cumsum(~is_site) - 1]
     sigma_area = (mesh.electrical_conductivity * mesh.area)[start_fibril[element]]
-    length = np.diff(both_xi[order], append=np.nan)
+    length = np.diff(both_xi[permutation], append=np.nan)
     piece = length / (sigma_area * contacts.axial_factor[element])
     return np.add.reduceat(piece, np.flatnonzero(is_site))
 

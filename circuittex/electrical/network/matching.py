@@ -217,8 +217,11 @@ def _matched(design: Design, grouping: Groups, target: Floats, model: Model, dat
     logs = np.log(np.where(unknown, 1.0, grouping.start))
     starts = [np.where(unknown, segment + step, logs) for step in np.log(RATIOS)]
     start = min(starts, key=lambda each: float(np.linalg.norm(both(each)[0])))
-    wide = np.where(unknown, np.log(BEYOND * RATIOS[-1]), np.log(BEYOND))
-    bounds = np.where(unknown, segment, logs) - wide, np.where(unknown, segment, logs) + wide
+    middle = np.where(unknown, segment, logs)
+    bounds = (
+        middle + np.where(unknown, np.log(RATIOS[0] / BEYOND), -np.log(BEYOND)),
+        middle + np.where(unknown, np.log(RATIOS[-1] * BEYOND), np.log(BEYOND)),
+    )
 
     def misfits(logs: Floats) -> Floats:
         return both(logs)[0]

@@ -83,12 +83,12 @@ def paper_study(study: Study) -> PaperStudy | None:
 def _along(study: Study, direction: Floats) -> tuple[Record, ...]:
     """The records of the loading F = I + e `direction` with growing e that goes farthest; clamps on all sides."""
     found: tuple[Record, ...] = ()
-    free = {loading.name for loading in study.design.loading if loading.free}
+    strips = {loading.name for loading in study.design.loading if loading.free}
     for name, records in by_loading(study).items():
         offsets = np.array([record.gradient - np.eye(2) for record in records])
         size = (offsets * direction).sum(axis=(1, 2))
         along = np.allclose(offsets, size[:, None, None] * direction, rtol=0.0, atol=1e-12)
-        if along and name not in free and len(records) > 1 and (np.diff(size) > 0.0).all() and size[0] == 0.0:
+        if along and name not in strips and len(records) > 1 and (np.diff(size) > 0.0).all() and size[0] == 0.0:
             found = max(found, records, key=lambda states: states[-1].strain if states else 0.0)
     return found
 

@@ -17,12 +17,16 @@ from circuittex.results.outcome import Outcome
 from circuittex.results.plot.error_bars import Bar, draw_error_bars, error_bar_key
 from circuittex.results.plot.style import COLOURS, GREY, LINES, MARKERS, new_figure, style
 from circuittex.results.records import Record, Study
-from circuittex.results.summary import insulated_resistance
+from circuittex.results.summary import insulated_resistances, network_names
 
 CLAMPS = ("warp clamps, +x ends", "weft clamps, +y ends")
 ESTIMATED = ("Fx warp", "Fy weft")
 """What error estimates call the force along the yarns at these clamps."""
 MOST_COLUMNS = 3
+MOST_TICKS = 5
+"""Intervals between strains on an axis: numbers as long as 0.0005 stand apart."""
+LEAST = 0.01
+"""Share of its values that an axis shows on either side at least, lest differences in the fifth digit fill it."""
 _DIAMOND: dict[str, Any] = {"linestyle": "", "marker": "D", "markersize": 7, "markerfacecolor": "none"}
 """The other branch of a bifurcation, larger than the markers of the curve that it may lie on."""
 
@@ -60,6 +64,7 @@ def conductance_figure(study: Study) -> Figure:
             axes = figure.add_subplot(rows, columns, number + 1)
             for k, (loading, records) in enumerate(loadings.items()):
                 _line(axes, study, records, _current(number), COLOURS[number % len(COLOURS)], k, loading)
+            _widen(axes)
             draw_error_bars(axes, _bars(study, loadings.values(), f"I {probe.name}"), COLOURS[number % len(COLOURS)])
             axes.set_title(f"probe {probe.name}")
             axes.set_ylabel(f"current at {probe.voltage:g} V (A)")
@@ -68,28 +73,33 @@ def conductance_figure(study: Study) -> Figure:
 
 
 def network_figure(study: Study) -> Figure:
-    """Ry and Rc of the reduced network [43-47] against strain, ohm; dashed the Ry of insulated yarns [57]."""
-    loadings = by_loading(study)
+    """Ry and Rc of the reduced network [43-47] against strain, ohm; dashed the Ry of insulated yarns [57].
+
+    Where there are several kinds of yarn, each kind and each pair of kinds that cross has a panel: their sizes differ
+    by orders."""
+    loadings, names = by_loading(study), network_names(study)
+    insulated = insulated_resistances(study.design, study.mesh, names)
+    columns = min(len(names), 2 if len(names) == 4 else MOST_COLUMNS)
+    rows = -(-len(names) // columns)
     with style():
-        figure = new_figure(8.0, 3.4)
-        left, right = figure.subplots(1, 2)
-        for k, (loading, records) in enumerate(loadings.items()):
-            _line(left, study, records, lambda outcome: outcome.Ry, COLOURS[0], k, loading)
-            _line(right, study, records, lambda outcome: outcome.Rc, COLOURS[1], k, loading)
-        insulated = insulated_resistance(study.mesh)
-        if np.isfinite(insulated):
-            left.axhline(insulated, color=GREY, linestyle="--", linewidth=1.0, label=f"insulated, {insulated:.4g} Ω")
-            low, high = left.get_ylim()  # at least 1 % either side, lest differences in the fifth digit fill the axis
-            left.set_ylim(min(low, 0.99 * insulated), max(high, 1.01 * insulated))
-        draw_error_bars(left, _bars(study, loadings.values(), "Ry"), COLOURS[0])
-        draw_error_bars(right, _bars(study, loadings.values(), "Rc"), COLOURS[1])
-        for axes, ohms in ((left, [r.fit.Ry for r in study.records]), (right, [r.fit.Rc for r in study.records])):
-            if not np.isfinite(ohms).any():
+        figure = new_figure({1: 5.0, 2: 8.0, 3: 10.0}[columns], 3.4 * rows)
+        for number, name in enumerate(names):
+            axes = figure.add_subplot(rows, columns, number + 1)
+            colour = COLOURS[number % len(COLOURS)]
+            for k, (loading, records) in enumerate(loadings.items()):
+                _line(axes, study, records, _resistance(number), colour, k, loading)
+            if np.isfinite(ohm := insulated.get(name, np.inf)):
+                axes.axhline(ohm, color=GREY, linestyle="--", linewidth=1.0, label=f"insulated, {ohm:.4g} Ω")
+                low, high = axes.get_ylim()
+                axes.set_ylim(min(low, (1 - LEAST) * ohm), max(high, (1 + LEAST) * ohm))
+            draw_error_bars(axes, _bars(study, loadings.values(), name), colour)
+            if not np.isfinite([record.outcome.network[number] for record in study.records]).any():
                 axes.text(0.5, 0.5, "infinite or not determined", ha="center", va="center", transform=axes.transAxes)
-        left.set_title("yarn segment")
-        left.set_ylabel("Ry (Ω)")
-        right.set_title("crossing")
-        right.set_ylabel("Rc (Ω)")
+                axes.set(xticks=[], yticks=[])
+            letters, _, kind = name.partition(" ")
+            part = {"Ry": "yarn segment", "Rc": "crossing"}[letters]
+            axes.set_title(f"{part}\n{kind}" if kind else part)
+            axes.set_ylabel(f"{letters} (Ω)")
         _finish(figure, study, [])
     return figure
 
@@ -100,6 +110,10 @@ def _clamp_force(side: int, component: int) -> Value:
 
 def _current(number: int) -> Value:
     return lambda outcome: outcome.currents[number]
+
+
+def _resistance(number: int) -> Value:
+    return lambda outcome: outcome.network[number]
 
 
 def _bars(study: Study, loadings: Iterable[Sequence[Record]], name: str) -> Iterator[Bar]:
@@ -135,6 +149,14 @@ def _line(
         axes.plot(*zip(*other, strict=True), color=colour, **_DIAMOND)
 
 
+def _widen(axes: Axes) -> None:
+    """Make an axis at least twice `LEAST` of its values high."""
+    low, high = axes.get_ylim()
+    spare = LEAST * max(abs(low), abs(high)) - (high - low) / 2.0
+    if spare > 0.0:
+        axes.set_ylim(low - spare, high + spare)
+
+
 def _on_the_way_back(strain: Floats) -> NDArray[np.bool_]:
     """(n,) whether the step to a state made the strain smaller."""
     back: NDArray[np.bool_] = np.diff(np.abs(strain), prepend=-np.inf) < 0.0
@@ -147,7 +169,9 @@ def _finish(figure: Figure, study: Study, names: Sequence[str]) -> None:
     only = names or [records[-1].loading if len(loadings) == 1 else "" for records in loadings[:1] for _ in figure.axes]
     for axes, name in zip(figure.axes, only, strict=True):
         axes.set_xlabel(f"strain ({name})" if name else "strain")
-        axes.ticklabel_format(axis="y", useOffset=False)
+        if len(axes.get_xticks()):  # a panel that says why it is empty has none
+            axes.ticklabel_format(axis="y", useOffset=False)
+            axes.locator_params(axis="x", nbins=MOST_TICKS)
         if axes.get_legend_handles_labels()[1]:
             axes.legend()
     keys = []

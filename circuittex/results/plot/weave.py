@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -58,10 +59,10 @@ def _force_figure(study: Study, records: Sequence[Record], pixels: int) -> Figur
             values = record.section_force[tubes.span_element(study.mesh)]
             scale = _Scale("section force", "N", "viridis", float(values.min()))
             _draw(axes, study.mesh, record.configuration.x, values, scale, view, pixels)
-            _axes_triad(axes, view, record.configuration.r)
+            _axes_triad(axes, view, record.configuration.r, _unit(study.mesh))
             axes.set_title(f"{record.name}: section force")
             panels.append(axes)
-        _same_scale(panels, 0.5)
+        _same_scale(panels, 0.5 * _unit(study.mesh))
     return figure
 
 
@@ -87,7 +88,7 @@ def probe_figure(study: Study, records: Sequence[Record], quantity: str) -> Figu
                 current = f"{fields.currents[0]:.4g} A at {fields.voltage:g} V"
                 axes.set_title(f"{record.name}, probe {fields.probe}\n{current}")
                 panels.append(axes)
-        _same_scale(panels, 1.2)
+        _same_scale(panels, 1.2 * _unit(study.mesh))
     return figure
 
 
@@ -130,17 +131,32 @@ def _same_scale(panels: Sequence[Axes], margin: float) -> None:
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
 
 
-def _axes_triad(axes: Axes, view: Camera, r: Floats) -> None:
-    """Arrows of 1 mm along x, y and z in the corner of the picture."""
-    low = view.project(r).min(axis=0)
+def _unit(mesh: FibrilMesh) -> float:
+    """What marks, arrows and margins are measured in, mm: an eighth of the longest fibril, 1 mm in the paper's cell."""
+    return float(mesh.length.max()) / 8.0
+
+
+def round_length(most: float) -> float:
+    """The largest length of one digit, 1, 2 or 5, that is no longer than `most`.
+
+    >>> round_length(1.0), round_length(0.25), round_length(0.06)
+    (1.0, 0.2, 0.05)
+    """
+    ten = 10.0 ** math.floor(math.log10(most))
+    return max(digit * ten for digit in (1, 2, 5) if digit * ten <= most * (1.0 + 1e-9))
+
+
+def _axes_triad(axes: Axes, view: Camera, r: Floats, unit: float) -> None:
+    """Arrows of a round length along x, y and z in the corner of the picture."""
+    low, length = view.project(r).min(axis=0), round_length(unit)
     readable = [withStroke(linewidth=2.5, foreground="white")]  # where a fibril lies behind
-    for direction, name in zip(view.project(np.eye(3)), "xyz", strict=True):
+    for direction, name in zip(length * view.project(np.eye(3)), "xyz", strict=True):
         tip = low[:2] + direction[:2]
         arrow = {"arrowstyle": "-|>", "color": GREY, "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", tip, low[:2], arrowprops=arrow, annotation_clip=False)
         right, up = low[:2] + 1.25 * direction[:2]
         axes.text(right, up, name, ha="center", va="center", color=GREY, path_effects=readable)
-    axes.text(low[0], low[1] - 0.15, "1 mm", ha="center", va="top", color=GREY, fontsize=8)
+    axes.text(low[0], low[1] - 0.15 * length, f"{length:g} mm", ha="center", va="top", color=GREY, fontsize=8)
 
 
 def _mark_terminals(axes: Axes, study: Study, record: Record, fields: Fields, view: Camera) -> None:
@@ -151,7 +167,7 @@ def _mark_terminals(axes: Axes, study: Study, record: Record, fields: Fields, vi
         for yarn, side in ends[name]:
             nodes = mesh.end_nodes(side)[mesh.yarn == mesh.yarn_names.index(yarn)]
             place = seen[nodes].mean(axis=0)
-            place += 0.9 * (place - middle) / np.linalg.norm((place - middle)[:2])
+            place += 0.9 * _unit(mesh) * (place - middle) / np.linalg.norm((place - middle)[:2])
             axes.text(
                 place[0],
                 place[1],

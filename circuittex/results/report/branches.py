@@ -41,10 +41,11 @@ def branch_alarm(checks: Sequence[BranchCheck]) -> Markup:
     return render("alarm.html", sentences=branch_statement([check for check in checks if check.alarming]))
 
 
-def branch_section(checks: Sequence[BranchCheck], probes: Sequence[str]) -> Markup:
-    """The section as HTML; nothing without checks. `probes` are the names of the currents.
+def branch_section(checks: Sequence[BranchCheck], probes: Sequence[str], network: Sequence[str]) -> Markup:
+    """The section as HTML; nothing without checks. `probes` are the names of the currents, `network` those of the
+    resistances.
 
-    >>> str(branch_section((), ()))
+    >>> str(branch_section((), (), ()))
     ''
     """
     if not checks:
@@ -55,7 +56,7 @@ def branch_section(checks: Sequence[BranchCheck], probes: Sequence[str]) -> Mark
         introduction=_INTRODUCTION,
         head=[*head, "energy (N mm)", "largest distance (mm)", "verdict"],
         rows=[_row(check) for check in checks],
-        bifurcations=[_both(check, probes) for check in checks if check.bifurcation],
+        bifurcations=[_both(check, probes, network) for check in checks if check.bifurcation],
         troubles=[f"{check.state}: {check.verdict} ({check.trouble})" for check in checks if check.trouble],
     )
 
@@ -67,10 +68,10 @@ def _row(check: BranchCheck) -> list[str]:
     return [check.state, *(number(value, 2) for value in values), check.verdict]
 
 
-def _both(check: BranchCheck, probes: Sequence[str]) -> dict[str, Any]:
+def _both(check: BranchCheck, probes: Sequence[str], network: Sequence[str]) -> dict[str, Any]:
     """The two branches of a bifurcation side by side."""
     names = [f"{side} F{axis} (N)" for side in ("warp +x", "weft +y") for axis in "xyz"]
-    names += [*(f"I {probe} (A)" for probe in probes), "Ry (Ω)", "Rc (Ω)", "stored energy (N mm)"]
+    names += [*(f"I {probe} (A)" for probe in probes), *(f"{name} (Ω)" for name in network), "stored energy (N mm)"]
     head = ["", "recorded branch", "other branch", *(f"{which}, relaxed further" for which in _WHICH if check.settled)]
     outcomes = check.recorded, check.again, *check.settled
     columns = ([number(value, DIGITS) for value in _values(outcome)] for outcome in outcomes)
@@ -79,4 +80,4 @@ def _both(check: BranchCheck, probes: Sequence[str]) -> dict[str, Any]:
 
 
 def _values(outcome: Outcome) -> list[float]:
-    return [*map(float, outcome.clamp_force.ravel()), *outcome.currents, outcome.Ry, outcome.Rc, outcome.energy]
+    return [*map(float, outcome.clamp_force.ravel()), *outcome.currents, *outcome.network, outcome.energy]

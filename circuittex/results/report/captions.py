@@ -17,7 +17,8 @@ _CAPTIONS = {
     "marks the source, minus the sink.",
     "temperatures": "Temperature rise from Joule heating {where}, each probe on its own scale of colour.",
     "network": "The reduced network: resistance Ry of a yarn segment between two crossings (dashed: the same yarn "
-    "without any contacts) and Rc of a crossing.",
+    "without any contacts) and Rc of a crossing; where there are several kinds of yarn, for each kind and for each "
+    "pair that crosses (the median of its crossings).",
     "verification": "Largest differences between the independent routes to the same voltages and currents, and what "
     "merging contacts and the finite-element mesh change.",
     "convergence": "The potential on the mesh of the mechanics, and on two refinements of it, converges to the "

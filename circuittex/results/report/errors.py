@@ -46,7 +46,7 @@ def _row(quantity: QuantityError) -> list[str]:
         percent(quantity.relative),
         number(quantity.mesh, 2),
         number(quantity.contact, 2),
-        number(quantity.order, 2),
+        number(quantity.observed_order, 2),
         *(number(value, 6) for value in (quantity.coarse, quantity.fine, quantity.more_points)),
     ]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from circuittex.base.arrays import Floats
 from circuittex.base.atomic import write_text
 from circuittex.results.claims.table import Table, claims_table
 from circuittex.results.plot import save_figures
@@ -28,7 +30,8 @@ from circuittex.results.summary import (
     confirmed,
     difference,
     effort,
-    insulated_resistance,
+    insulated_resistances,
+    network_names,
     network_statement,
     ngspice_statement,
 )
@@ -65,7 +68,7 @@ def page(study: Study, pictures: Mapping[str, bytes], beside: Sequence[Study] = 
             states=_states(study),
             network=_network(study),
             claims=claims_section(claims),
-            branches=branch_section(study.branches, [probe.name for probe in study.design.probes]),
+            branches=branch_section(study.branches, _probes(study), network_names(study)),
             errors=error_section(study.errors),
             verification=_verification(study),
             parameters=parameters(study.design),
@@ -77,6 +80,10 @@ def page(study: Study, pictures: Mapping[str, bytes], beside: Sequence[Study] = 
 def picture(caption: str, png: bytes | None) -> dict[str, str | None]:
     """What a template needs of a figure: its caption, and the picture as text; none where it was not drawn."""
     return {"caption": caption, "data": None if png is None else base64.b64encode(png).decode("ascii")}
+
+
+def _probes(study: Study) -> list[str]:
+    return [probe.name for probe in study.design.probes]
 
 
 def _facts(study: Study, claims: Table | None) -> dict[str, str]:
@@ -115,7 +122,7 @@ def _verdict(study: Study) -> tuple[str, list[str]]:
 
 
 def _states(study: Study) -> Markup:
-    probes = [f"I {probe.name} (A)" for probe in study.design.probes]
+    probes = [f"I {name} (A)" for name in _probes(study)]
     head = ["state", "strain", *probes, "peak temperature rise (K)"]
     rows = [
         [
@@ -138,8 +145,14 @@ def _states(study: Study) -> Markup:
 
 def _forces(study: Study) -> dict[str, Any]:
     head = ["state", *(f"{side} F{axis} (N)" for side in ("warp +x", "weft +y") for axis in "xyz")]
-    rows = [[r.name, *(f"{force:.4f}" for force in r.clamp_force.ravel())] for r in study.records]
+    rows = [[r.name, *_rounded(r.clamp_force.ravel())] for r in study.records]
     return {"head": head, "rows": rows}
+
+
+def _rounded(values: Floats) -> list[str]:
+    """Numbers to five digits of the largest, whose size may be any."""
+    last = 10.0 ** (math.floor(math.log10(np.abs(values).max(initial=0.0) or 1.0)) - 4)
+    return [_number(round(value / last) * last + 0.0, 5) for value in values.tolist()]
 
 
 def _equilibrium(study: Study) -> dict[str, Any]:
@@ -163,16 +176,25 @@ def _network(study: Study) -> Markup:
     if not study.records:
         return Markup()
     rows = [
-        [r.name, _number(r.fit.Ry), _number(r.fit.Rc), f"{r.fit.residual:.2e}", "; ".join(r.fit.warnings) or "none"]
+        [
+            r.name,
+            *map(_number, r.outcome.network),
+            f"{r.fit.residual:.2e}",
+            _number(100.0 * r.fit.pair_errors[0], 2),
+            "; ".join(r.fit.warnings) or "none",
+        ]
         for r in study.records
     ]
+    insulated = insulated_resistances(study.design, study.mesh, network_names(study))
+    one = len(insulated) == 1
     return render(
         "network.html",
-        head=["state", "Ry (Ω)", "Rc (Ω)", "misfit", "warnings"],
+        head=["state", *(f"{name} (Ω)" for name in network_names(study)), "misfit", "between pins (%)", "warnings"],
         rows=rows,
         weighting=study.records[0].fit.weighting,
         sentences=network_statement(study),
-        insulated=_number(insulated_resistance(study.mesh)),
+        method=study.records[0].fit.method,
+        insulated=", ".join(f"{_number(ohm)} Ω" + ("" if one else f" ({name[3:]})") for name, ohm in insulated.items()),
     )
 
 

@@ -18,22 +18,28 @@ def parameters(design: Design) -> Markup:
     """The tables of all settings as HTML; the packing where it is not the regular one."""
     yarns = dict.fromkeys(design.weave.warp + design.weave.weft)
     materials = dict.fromkeys(material for yarn in yarns for material in yarn.materials)
-    parts = [
+    tables = [
         _weave(design.weave),
         *(
-            _settings(f"Yarn {yarn.name}", yarn, {"materials": runs(m.name for m in yarn.materials)}, skip=("name",))
+            _settings(
+                f"Yarn {yarn.name}",
+                yarn,
+                {"materials": runs(m.name for m in yarn.materials), "rows": ", ".join(map(str, yarn.rows))},
+                skip=("name",),
+            )
             for yarn in yarns
         ),
         *(_settings(f"Material {material.name}", material, skip=("name",)) for material in materials),
         *([] if design.packing.regular else [_settings("Random packing", design.packing)]),
-        _settings("Contact", design.contact),
+        _settings("Contact", design.contact, skip=("pairs",)),
+        *(_settings(f"Contact {' - '.join(p.materials)}", p, skip=("materials",)) for p in design.contact.pairs),
         _settings("Electrical", design.electrical),
         _settings("Numerics", design.numerics),
         _loading(design),
         _terminals(design),
         _probes(design),
     ]
-    return render("parameters.html", parts=[part for part in parts if part["rows"]])
+    return render("parameters.html", tables=[each for each in tables if each["rows"]])
 
 
 def _weave(weave: Weave) -> dict[str, Any]:
@@ -43,7 +49,7 @@ def _weave(weave: Weave) -> dict[str, Any]:
 
 
 def _loading(design: Design) -> dict[str, Any]:
-    head = ["path", "states", "strain", "last average deformation gradient", "ends let go"]
+    head = ["loading", "states", "strain", "last average deformation gradient", "ends let go"]
     rows = [
         [
             loading.name,

@@ -144,7 +144,7 @@ def _read(content: Overlay) -> Study:
         if start.attrs["@digest"] != digest(head):
             raise StoreError("its content does not match its digest")
         study = Study(**dict(zip(HEAD, head, strict=True)), records=())
-        study = replace(study, records=_in_order(study.design, _checked(records, "record", digest)))
+        study = replace(study, records=_by_plan(study.design, _checked(records, "record", digest)))
         for kind, members in examinations.items():
             for examination in _checked(members, NAMES[kind], digest):
                 study = with_examination(study, examination)
@@ -157,7 +157,7 @@ def _in_newtons(design: Design) -> Design:
     return replace(design, numerics=replace(numerics, tolerance=f"{numerics.tolerance!r} N"))
 
 
-def _in_order(design: Design, records: Sequence[Record]) -> tuple[Record, ...]:
+def _by_plan(design: Design, records: Sequence[Record]) -> tuple[Record, ...]:
     """The records loading by loading, whatever the order in which these came on; within one it is theirs."""
     rank = {"": 0} | {loading.name: number for number, loading in enumerate(design.loading, start=1)}
     return tuple(sorted(records, key=lambda record: rank[record.loading]))

@@ -47,9 +47,9 @@ def span_current(mesh: FibrilMesh, fields: Fields) -> Floats:
     """(I,) mean over each span of the current along +xi, A; exact for the piecewise constant current."""
     start = _starts(mesh)
     ends = start[fields.fibril[fields.segments]] + fields.xi[fields.segments]
-    order = np.argsort(ends[:, 0], kind="stable")
-    ends = ends[order]
-    passed = np.cumsum(np.diff(ends, axis=1)[:, 0] * fields.segment_current[order])
+    permutation = np.argsort(ends[:, 0], kind="stable")
+    ends = ends[permutation]
+    passed = np.cumsum(np.diff(ends, axis=1)[:, 0] * fields.segment_current[permutation])
     integral = np.stack([np.concatenate([[0.0], passed[:-1]]), passed], axis=1)
     nodes = spans(mesh)
     total = np.interp(start[mesh.node_fibril] + mesh.xi, ends.ravel(), integral.ravel())

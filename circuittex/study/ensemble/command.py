@@ -11,8 +11,8 @@ from circuittex.study.ensemble.files import PAGE
 from circuittex.study.ensemble.result import Ensemble, percentiles
 from circuittex.study.ensemble.run import run_ensemble
 
-SHOWN = ("warp_Fx", "weft_Fy", "Ry", "Rc")
-"""Quantities of the closing table; ensemble.csv has all of them."""
+SHOWN = ("warp_Fx", "weft_Fy")
+"""Quantities of the closing table besides the resistances; ensemble.csv has all of them."""
 
 
 def ensemble_command(options: argparse.Namespace, progress: Callable[[str], None]) -> Ensemble:
@@ -36,8 +36,8 @@ def folder_of(options: argparse.Namespace) -> Path:
 def closing_words(ensemble: Ensemble, folder: Path) -> str:
     """The median and the band from 5 to 95 % of the main quantities, and where the page is."""
     low, middle, high = percentiles(ensemble.values, (5, 50, 95))
-    column = {quantity.name: number for number, quantity in enumerate(ensemble.quantities)}
-    shown = [column[name] for name in SHOWN if name in column]
+    names = [quantity.name for quantity in ensemble.quantities]
+    shown = [q for q, name in enumerate(names) if name in SHOWN or name.partition("_")[0] in ("Ry", "Rc")]
     lines = [f"{'state':<20} " + " ".join(f"{ensemble.quantities[q].column:>28}" for q in shown)]
     for s, state in enumerate(ensemble.states):
         cells = [f"{middle[s, q]:.4g} [{low[s, q]:.4g}, {high[s, q]:.4g}]" for q in shown]

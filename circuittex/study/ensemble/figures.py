@@ -13,9 +13,10 @@ from matplotlib.figure import Figure
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.design.packing import Packing
+from circuittex.fit import network_names
 from circuittex.geometry.weave import build_mesh
 from circuittex.results.plot.style import COLOURS, GREY, new_figure, save, style
-from circuittex.results.summary import insulated_resistance
+from circuittex.results.summary import insulated_resistances
 from circuittex.study.ensemble.quantities import SIDES
 from circuittex.study.ensemble.result import BANDS, Ensemble, percentiles
 
@@ -37,8 +38,9 @@ def band_figures(ensemble: Ensemble) -> dict[str, Figure]:
             for probe in ensemble.design.probes
         ],
         "network": [
-            ("yarn segment", "Ry (Ω)", [("Ry", "")]),
-            ("crossing", "Rc (Ω)", [("Rc", "")]),
+            (f"{part}{name[2:]}", f"{name[:2]} (Ω)", [(name.replace(" ", "_"), "")])
+            for part, names in zip(("yarn segment", "crossing"), network_names(ensemble.design), strict=True)
+            for name in names
         ],
     }
     return {
@@ -68,8 +70,8 @@ def _figure(ensemble: Ensemble, panels: Sequence[Panel]) -> Figure:
                     # the panels of one quantity have the colours of their place, as in the report of a study
                     number = colour if len(shown) > 1 else place
                     draw_band(axes, ensemble.strains[states], values, COLOURS[number % len(COLOURS)], name)
-                if shown[0][0] == "Ry":
-                    _draw_insulated(axes, ensemble)
+                if shown[0][0].partition("_")[0] == "Ry":
+                    _draw_insulated(axes, ensemble, shown[0][0])
                 _widen(axes)
                 axes.set_title(title)
                 axes.set_ylabel(label)
@@ -79,11 +81,12 @@ def _figure(ensemble: Ensemble, panels: Sequence[Panel]) -> Figure:
     return figure
 
 
-def _draw_insulated(axes: Axes, ensemble: Ensemble) -> None:
+def _draw_insulated(axes: Axes, ensemble: Ensemble, quantity: str) -> None:
     """A dashed line at the Ry of the same yarns without contacts [57], which no packing changes."""
-    ohms = insulated_resistance(build_mesh(replace(ensemble.design, packing=Packing())))
-    if np.isfinite(ohms):
-        axes.axhline(ohms, color=GREY, linestyle="--", linewidth=1.0, label=f"insulated, {ohms:.4g} Ω")
+    mesh = build_mesh(replace(ensemble.design, packing=Packing()))
+    for name, ohm in insulated_resistances(ensemble.design, mesh, network_names(ensemble.design)[0]).items():
+        if name.replace(" ", "_") == quantity and np.isfinite(ohm):
+            axes.axhline(ohm, color=GREY, linestyle="--", linewidth=1.0, label=f"insulated, {ohm:.4g} Ω")
 
 
 def _widen(axes: Axes) -> None:

@@ -12,7 +12,7 @@ ensemble.json is strict JSON: a number that is not determined is null, an infini
 ``quantities``
     names with units, such as ``warp_Fx_N``, in the order of every list of values
 ``states``
-    for each state ``name``, ``path``, ``strain``, ``count`` of members, and under ``percentiles`` the lists for
+    for each state ``name``, ``loading``, ``strain``, ``count`` of members, and under ``percentiles`` the lists for
     ``p5``, ``p25``, ``p50``, ``p75`` and ``p95``
 ``members``
     for each member ``number``, ``seed``, ``failure`` (empty where it has all states), ``disagreeing`` states, and
@@ -40,7 +40,7 @@ from circuittex.study.ensemble.result import BANDS, Ensemble, percentiles
 
 FORMAT = 1
 STATE, TABLE, PAGE = "ensemble.json", "ensemble.csv", "ensemble.html"
-COLUMNS = ("state", "path", "strain", "quantity", "unit", "median", "p5", "p25", "p75", "p95", "members")
+COLUMNS = ("state", "loading", "strain", "quantity", "unit", "median", "p5", "p25", "p75", "p95", "members")
 
 
 def open_folder(folder: Path, design: Design) -> None:
@@ -94,14 +94,14 @@ def table(ensemble: Ensemble) -> str:
 
 def content(ensemble: Ensemble) -> dict[str, Any]:
     """The content of ensemble.json."""
-    parts = percentiles(ensemble.values, BANDS)
+    bands = percentiles(ensemble.values, BANDS)
     states = [
         {
             "name": name,
-            "path": ensemble.loadings[s],
+            "loading": ensemble.loadings[s],
             "strain": float(ensemble.strains[s]),
             "count": ensemble.count[s].tolist(),
-            "percentiles": {f"p{percent:g}": plain(part[s]) for percent, part in zip(BANDS, parts, strict=True)},
+            "percentiles": {f"p{percent:g}": plain(band[s]) for percent, band in zip(BANDS, bands, strict=True)},
         }
         for s, name in enumerate(ensemble.states)
     ]

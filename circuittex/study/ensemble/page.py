@@ -62,9 +62,9 @@ def _verdict(ensemble: Ensemble) -> tuple[str, list[str]]:
 
 
 def _bands(ensemble: Ensemble) -> dict[str, Any]:
-    parts = percentiles(ensemble.values, BANDS)
+    bands = percentiles(ensemble.values, BANDS)
     rows = [
-        [state, f"{quantity.name} ({quantity.unit})", *map(number, parts[:, s, q]), str(ensemble.count[s, q])]
+        [state, f"{quantity.name} ({quantity.unit})", *map(number, bands[:, s, q]), str(ensemble.count[s, q])]
         for s, state in enumerate(ensemble.states)
         for q, quantity in enumerate(ensemble.quantities)
     ]

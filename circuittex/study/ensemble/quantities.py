@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from circuittex.base.frozen import frozen
 from circuittex.design import Design
+from circuittex.fit import network_names
 from circuittex.results.records import Record
 
 SIDES = ("warp", "weft")
@@ -35,14 +36,17 @@ def quantities(design: Design) -> tuple[Quantity, ...]:
     >>> from circuittex.design import plain_weave
     >>> [quantity.name for quantity in quantities(plain_weave(yarns=1))][5:]
     ['weft_Fz', 'current_straight', 'current_perpendicular', 'Ry', 'Rc']
+
+    Where there are several kinds of yarn, each has its Ry and each pair of kinds that cross its Rc: 'Ry_copper_warp'.
     """
     forces = [Quantity(f"{side}_F{axis}", "N") for side in SIDES for axis in "xyz"]
     currents = [Quantity(f"current_{probe.name}", "A") for probe in design.probes]
-    network = [Quantity("Ry", "ohm"), Quantity("Rc", "ohm")] if design.probes else []
+    names = [name for each in network_names(design) for name in each] if design.probes else []
+    network = [Quantity(name.replace(" ", "_"), "ohm") for name in names]
     return (*forces, *currents, *network)
 
 
 def measure(record: Record) -> list[float]:
     """The values of a recorded state, in the order of `quantities`."""
-    network = [record.fit.Ry, record.fit.Rc] if record.fields else []
+    network = record.outcome.network if record.fields else ()
     return [*map(float, record.clamp_force.ravel()), *record.currents, *map(float, network)]

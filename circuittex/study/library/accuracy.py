@@ -36,7 +36,7 @@ class Errors:
         return _over(self.resistance, np.median), _over(self.change, np.median)
 
 
-def pair_errors(exact: Sequence[PortMatrix], found: Sequence[PortMatrix]) -> Errors:
+def compared(exact: Sequence[PortMatrix], found: Sequence[PortMatrix]) -> Errors:
     """Errors of port matrices state by state; the first state is the relaxed one."""
     wanted = np.array([resistances(matrix) for matrix in exact])
     given = np.array([resistances(matrix) for matrix in found])

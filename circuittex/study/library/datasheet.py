@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path as File
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from circuittex.study.library.accuracy import Errors
 from circuittex.study.library.cell import Cell
 from circuittex.study.library.facts import GOOD, Facts
 from circuittex.study.library.figures import save_figures
+from circuittex.study.library.network import Network
 
 CAPTIONS = {
     "errors_cell": "Largest error of the cell of Ry and Rc at each pair of pins, over all states.",
@@ -33,7 +34,9 @@ MISSING = {
 }
 
 
-def write_datasheet(folder: File, study: Study, known: Facts, cells: Sequence[Cell]) -> File:
+def write_datasheet(
+    folder: Path, study: Study, known: Facts, cells: Sequence[Cell], networks: Mapping[str, Network]
+) -> Path:
     """Draw the figures into ``folder/figures`` and write ``folder/datasheet.html``; returns its path."""
     pictures = save_figures(known, folder / "figures")
     path = folder / "datasheet.html"
@@ -46,7 +49,7 @@ def write_datasheet(folder: File, study: Study, known: Facts, cells: Sequence[Ce
         sentences=[_recommendation(known)],
         errors=_errors(known),
         left_out=_left_out(known),
-        cells=_cells(cells),
+        cells=_cells(cells, networks),
         ratings=_ratings(study, known),
         rise=number(known.rise),
         missing=MISSING,
@@ -93,13 +96,15 @@ def _row(name: str, errors: Errors) -> list[str]:
     return [name, *(f"{number(100 * each, 3)} %" for each in (R, Rm, c, cm))]
 
 
-def _cells(cells: Sequence[Cell]) -> dict[str, Any]:
-    rows: dict[str, list[str]] = {}
-    for cell in cells:
-        rows.setdefault(cell.name, [cell.name, cell.title, cell.dialect])[2] += (
-            "" if rows[cell.name][2].split(", ")[-1] == cell.dialect else f", {cell.dialect}"
-        )
-    return {"head": ["sub-circuit", "what it is", "folders"], "rows": list(rows.values())}
+def _cells(cells: Sequence[Cell], networks: Mapping[str, Network]) -> dict[str, Any]:
+    """The sub-circuits with what they cost: a transient's time goes with the number of resistors, or faster."""
+    rows = []
+    for name, network in networks.items():
+        own = [cell for cell in cells if cell.name == name]
+        if own:
+            folders = ", ".join(cell.dialect for cell in own)
+            rows.append([name, own[0].title, str(len(network.names)), folders])
+    return {"head": ["sub-circuit", "what it is", "resistors", "folders"], "rows": rows}
 
 
 def _ratings(study: Study, known: Facts) -> dict[str, Any]:

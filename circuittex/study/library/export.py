@@ -6,7 +6,7 @@ import json
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from pathlib import Path as File
+from pathlib import Path
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from circuittex.base.errors import CircuittexWarning, DesignError
 from circuittex.base.version import __version__
 from circuittex.electrical.network.names import safe_name
 from circuittex.results.records import Study
+from circuittex.study.circuits import state_circuits
 from circuittex.study.export import probe_netlist, simplified
 from circuittex.study.library.accuracy import Errors
 from circuittex.study.library.cell import DIALECTS, Cell
@@ -33,7 +34,7 @@ FORMAT = 1
 
 def export_library(
     study: Study,
-    folder: str | File,
+    folder: str | Path,
     *,
     name: str = "fabric",
     state: str = "",
@@ -55,16 +56,17 @@ def export_library(
     known = facts_of(study, ends, thin, rise)
     word = safe_name(name) + ("_free" if ends == FREE else "")
     found = list(_parts(study, known, word, chosen, ends))
-    folder = File(folder)
+    folder = Path(folder)
     cells = [
         _write(folder, study, known, part, dialect, chosen)
         for dialect in dialects
         for part in found
         if dialect != "gnucap" or not part.path
     ]
-    _write_examples(folder / "examples", cells, {part.name: part.network for part in found})
+    networks = {part.name: part.network for part in found}
+    _write_examples(folder / "examples", cells, networks)
     _write_probes(folder / "examples", study, chosen)
-    write_datasheet(folder, study, known, cells)
+    write_datasheet(folder, study, known, cells, networks)
     library = {
         "format": FORMAT,
         "circuittex": __version__,
@@ -124,7 +126,7 @@ def _parts(study: Study, known: Facts, word: str, chosen: int, ends: str) -> Ite
         yield from strained_parts(word, design, known.levels, path, {"_thin": known.thin} if known.thin else {})
 
 
-def _write(folder: File, study: Study, known: Facts, part: Part, dialect: str, chosen: int) -> Cell:
+def _write(folder: Path, study: Study, known: Facts, part: Part, dialect: str, chosen: int) -> Cell:
     """Write the file of one sub-circuit in one dialect."""
     cell = Cell(part.name, part.level, part.title, part.pins, part.parameters, f"{dialect}/{part.name}.lib", dialect)
     state = f"strain of {part.path}" if part.path else study.records[chosen].name
@@ -135,7 +137,7 @@ def _write(folder: File, study: Study, known: Facts, part: Part, dialect: str, c
     return cell
 
 
-def _write_examples(folder: File, cells: Sequence[Cell], networks: Mapping[str, Network]) -> None:
+def _write_examples(folder: Path, cells: Sequence[Cell], networks: Mapping[str, Network]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for cell in cells:
         if cell.level != "detailed":
@@ -144,19 +146,20 @@ def _write_examples(folder: File, cells: Sequence[Cell], networks: Mapping[str, 
             _write_ascii(folder / f"{cell.dialect}_{cell.name}.cir", example_deck(cell, low, high, floating(network)))
 
 
-def _write_probes(folder: File, study: Study, chosen: int) -> None:
+def _write_probes(folder: Path, study: Study, chosen: int) -> None:
     """A deck of each probe for either meaning of the ends of yarns that it does not drive."""
     record, design = study.records[chosen], study.design
     if not design.probes:
         return
-    joined = detailed(design, record, CRIMPED)
-    simple = simplified(design, record.contacts)
+    circuits = state_circuits(simplified(design, record.contacts), design.terminals, design.probes)
     for probe in design.probes:
         word = safe_name(probe.name)
-        _write_ascii(folder / f"probe_{word}_free.cir", probe_netlist(design, record.name, simple, probe))
-        _write_ascii(folder / f"probe_{word}_crimped.cir", crimped_probe(design, joined, probe, record.name))
+        _write_ascii(folder / f"probe_{word}_free.cir", probe_netlist(design, record.name, circuits, probe))
+        _write_ascii(
+            folder / f"probe_{word}_crimped.cir", crimped_probe(design, circuits.yarn_ends, probe, record.name)
+        )
 
 
-def _write_ascii(path: File, text: str) -> None:
+def _write_ascii(path: Path, text: str) -> None:
     """The same bytes on every system: no CR before the LF."""
     write_text(path, text, encoding="ascii")

@@ -8,13 +8,13 @@ from circuittex.base.arrays import Floats
 from circuittex.base.frozen import frozen
 from circuittex.electrical.network.ports import PortMatrix, port_matrix
 from circuittex.results.records import Study
-from circuittex.study.library.accuracy import Errors, pair_errors
+from circuittex.study.library.accuracy import Errors, compared
 from circuittex.study.library.interpolation import without
 from circuittex.study.library.levels import CRIMPED, Levels, levels
 from circuittex.study.library.network import matrix_at, ports_network
 from circuittex.study.library.parts import Part
-from circuittex.study.library.path import Path, paths
 from circuittex.study.library.rating import rated_currents
+from circuittex.study.library.strain_path import StrainPath, paths
 from circuittex.study.library.thinning import thinned
 
 GOOD = 0.01
@@ -33,7 +33,7 @@ class Facts:
     """(S,) the ports without those resistors that matter least; empty unless asked for."""
     thin_error: float
     """By which part a resistance of these may rise."""
-    paths: tuple[Path, ...]
+    paths: tuple[StrainPath, ...]
     """The ways along which strain is an input."""
     errors: dict[str, Errors]
     """Of 'cell' and 'ports_thin', in all states, where they are there."""
@@ -74,23 +74,23 @@ def facts_of(study: Study, ends: str, thin: float, rise: float) -> Facts:
     errors = {}
     if not known.reason:
         found = [port_matrix(circuit, known.pins) for circuit in known.cells]
-        errors["cell"] = pair_errors(known.ports, found)
+        errors["cell"] = compared(known.ports, found)
     less = thinned(known.ports, thin) if thin else ()
     if less:
-        errors["ports_thin"] = pair_errors(known.ports, less)
+        errors["ports_thin"] = compared(known.ports, less)
     ways = paths(study)
     left = {way.word: _left_out(known, way) for way in ways if len(way.strain) > 2}
     return Facts(known, less, thin, ways, errors, left, rise, rated_currents(study, rise), ends)
 
 
-def _left_out(known: Levels, way: Path) -> Errors:
+def _left_out(known: Levels, way: StrainPath) -> Errors:
     """Errors of the ports of each inner state of a path where they are interpolated from all others."""
     own = [known.ports[k] for k in way.records]
     network = ports_network(own, way.strain)
     inner = range(1, len(own) - 1)
     found = [matrix_at(network, without(network.strain, network.conductance, k)) for k in inner]
     relaxed = own[int(np.argmin(np.abs(way.strain)))]
-    return pair_errors([relaxed, *own[1:-1]], [relaxed, *found])
+    return compared([relaxed, *own[1:-1]], [relaxed, *found])
 
 
 def _words(errors: Errors) -> str:

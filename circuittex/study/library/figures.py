@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path as File
+from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,7 +16,7 @@ from circuittex.study.library.accuracy import Errors
 from circuittex.study.library.facts import Facts
 from circuittex.study.library.interpolation import pieces, value
 from circuittex.study.library.network import matrix_at, ports_network
-from circuittex.study.library.path import Path
+from circuittex.study.library.strain_path import StrainPath
 
 SHOWN = 4
 """Pairs of pins whose resistance is drawn against strain."""
@@ -24,7 +24,7 @@ FINE = 60
 """Strains at which a curve is drawn."""
 
 
-def save_figures(known: Facts, folder: File) -> Mapping[str, bytes]:
+def save_figures(known: Facts, folder: Path) -> Mapping[str, bytes]:
     """Draw all figures into `folder`; returns the PNG files by name."""
     folder.mkdir(parents=True, exist_ok=True)
     with style():
@@ -60,7 +60,7 @@ def _against_strain(known: Facts) -> Figure:
     return figure
 
 
-def _curves(axes: Axes, known: Facts, path: Path) -> None:
+def _curves(axes: Axes, known: Facts, path: StrainPath) -> None:
     network = ports_network([known.levels.ports[k] for k in path.records], path.strain)
     found = pieces(network.strain, network.conductance)
     fine = np.linspace(path.strain[0], path.strain[-1], FINE)
@@ -94,5 +94,6 @@ def _network(known: Facts) -> Figure:
                 values = known.levels.units[path.records, column]
                 axes.plot(100 * path.strain, values, line, color=COLOURS[number % len(COLOURS)], marker="o", label=what)
         axes.set(xlabel="strain (%)", ylabel=label)
+        axes.set_ylim(bottom=0.0)  # from zero, or changes in the seventh digit would fill the picture
         axes.legend()
     return figure

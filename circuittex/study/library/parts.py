@@ -16,7 +16,7 @@ from circuittex.electrical.network.ports import PortMatrix
 from circuittex.study.library.cell import Pin
 from circuittex.study.library.levels import Levels
 from circuittex.study.library.network import FLAG, STRAIN, Network, circuit_network, pin_words, ports_network
-from circuittex.study.library.path import Path
+from circuittex.study.library.strain_path import StrainPath
 
 PARAMETER, PIN = "_s", "_v"
 """How names of cells end whose strain is a parameter, and a pin."""
@@ -71,7 +71,7 @@ def thin_part(name: str, design: Design, matrix: PortMatrix, error: float) -> Pa
 
 
 def strained_parts(
-    name: str, design: Design, known: Levels, path: Path, thin: Mapping[str, Sequence[PortMatrix]]
+    name: str, design: Design, known: Levels, path: StrainPath, thin: Mapping[str, Sequence[PortMatrix]]
 ) -> Iterator[Part]:
     """Ports, cell and unit with strain as a parameter and as a pin; `thin`: further reductions by the end of a name."""
     networks = {("ports", ""): ports_network([known.ports[k] for k in path.records], path.strain)}

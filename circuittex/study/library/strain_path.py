@@ -14,7 +14,7 @@ from circuittex.results.records import Study
 
 
 @frozen
-class Path:
+class StrainPath:
     """States of one loading whose strains rise or fall all the way."""
 
     word: str
@@ -27,7 +27,7 @@ class Path:
     """(K,) the record of the study that each strain belongs to."""
 
 
-def paths(study: Study) -> tuple[Path, ...]:
+def paths(study: Study) -> tuple[StrainPath, ...]:
     """The paths of all loadings of which at least one state beside the relaxed one is recorded, in their order."""
     found = []
     words = unique_names([loading.name for loading in study.design.loading])
@@ -41,7 +41,7 @@ def paths(study: Study) -> tuple[Path, ...]:
         for number, way in enumerate(ways):
             rising = way if strain[way[-1]] > strain[way[0]] else way[::-1]
             name = word if len(ways) == 1 else f"{word}_{_way(number)}"
-            found.append(Path(name, loading.name, strain[rising], states[rising]))
+            found.append(StrainPath(name, loading.name, strain[rising], states[rising]))
     return tuple(found)
 
 

@@ -12,7 +12,7 @@ from circuittex.base.frozen import same
 from circuittex.design import Material
 from circuittex.design.declaration import keys
 from circuittex.geometry.mesh import FibrilMesh
-from circuittex.geometry.order import reordered
+from circuittex.geometry.permutation import permuted
 
 
 def uneven() -> FibrilMesh:
@@ -47,10 +47,10 @@ def parts(mesh: FibrilMesh, fibril: int) -> tuple[np.ndarray | float, ...]:
 @pytest.mark.parametrize("seed", [0, 1])
 def test_every_fibril_is_what_it_was(seed: int) -> None:
     mesh = uneven()
-    order = np.random.default_rng(seed).permutation(mesh.n_fibrils)
-    other, nodes = reordered(mesh, order)
-    assert np.any(order != np.arange(mesh.n_fibrils))
-    for number, old in enumerate(order):
+    permutation = np.random.default_rng(seed).permutation(mesh.n_fibrils)
+    other, nodes = permuted(mesh, permutation)
+    assert np.any(permutation != np.arange(mesh.n_fibrils))
+    for number, old in enumerate(permutation):
         assert same(parts(other, number), parts(mesh, old))
         first, last = other.first_node[number : number + 2]
         assert np.array_equal(nodes[first:last], np.arange(mesh.first_node[old], mesh.first_node[old + 1]))
@@ -58,8 +58,8 @@ def test_every_fibril_is_what_it_was(seed: int) -> None:
 
 def test_the_inverse_order_gives_the_mesh_back() -> None:
     mesh = uneven()
-    order = np.random.default_rng(2).permutation(mesh.n_fibrils)
-    other, nodes = reordered(mesh, order)
-    back, again = reordered(other, np.argsort(order))
+    permutation = np.random.default_rng(2).permutation(mesh.n_fibrils)
+    other, nodes = permuted(mesh, permutation)
+    back, again = permuted(other, np.argsort(permutation))
     assert same(back, mesh)
     assert np.array_equal(nodes[again], np.arange(mesh.n_nodes))

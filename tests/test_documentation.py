@@ -100,6 +100,7 @@ def folder(small: str, computed: Path, tmp_path: Path, monkeypatch: pytest.Monke
         (tmp_path / f"{name}.toml").write_text(small, encoding="utf-8")
     for name in ("weave", "plain_weave"):
         shutil.copytree(computed, tmp_path / "results" / name)
+    shutil.copytree(computed, tmp_path / "results" / "packings-ensemble" / "members" / "0000")
     for name, study in (("paper", STUDY), ("paper_table", TABLE)):  # their cell is no small one
         (tmp_path / "results" / name).mkdir()
         write_study_start(tmp_path / "results" / name / "results.h5", study)

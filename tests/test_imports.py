@@ -57,7 +57,7 @@ ALLOWED: dict[str, set[str]] = {
         *{"results.plot.style", "results.report.number", "results.report.page", "results.report.template"},
     },
     "study.library": {
-        *{"design", "study", "results", "electrical.network", "netlist"},
+        *{"design", "study", "results", "results.store", "electrical.network", "netlist"},
         *{"results.plot.style", "results.report.number", "results.report.page", "results.report.template"},
     },
 }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +12,9 @@ from library_cases import ohmmeter, pins_of, resistor_matrix, study
 
 from circuittex.base.arrays import Floats
 from circuittex.electrical.network.circuit import build_circuit, yarn_end_terminals
-from circuittex.electrical.network.ports import port_matrix, resistances
+from circuittex.electrical.network.ports import PortMatrix, port_matrix, resistances
 from circuittex.electrical.spice.ngspice import run_decks
+from circuittex.results.records import Study
 from circuittex.study.export import simplified
 from circuittex.study.library.export import export_library
 
@@ -170,3 +173,62 @@ def test_thinned_ports_keep_their_bound(library: Path) -> None:
     assert few < many
     assert (thin / exact - 1.0).max() <= THIN * (1 + 1e-9)
     assert (thin / exact - 1.0).min() > -1e-9, "taking conductors away lowers no resistance (Rayleigh)"
+
+
+# Corners of an ensemble
+
+
+@pytest.fixture(scope="module")
+def corners(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Five packings that are the same but for all contacts and fibrils, which conduct 0.8 to 1.2 times as well."""
+    folder = tmp_path_factory.mktemp("corners")
+    export_library(STUDY, folder, members=[scaled(factor) for factor in FACTORS], dialects=("ngspice",))
+    return folder / "ngspice"
+
+
+FACTORS = (0.8, 0.9, 1.0, 1.1, 1.2)
+
+
+def scaled(factor: float) -> Study:
+    """The study with all resistances divided by a factor."""
+    records = []
+    for number, record in enumerate(STUDY.records):
+        names = [terminal.name for terminal in yarn_end_terminals(STUDY.mesh)]
+        matrix = PortMatrix(tuple(names), factor * matrices()[number])
+        records.append(replace(record, ports=matrix))
+    return replace(STUDY, records=tuple(records))
+
+
+@cache
+def matrices() -> list[Floats]:
+    """(P, P) port matrix of each state."""
+    found = []
+    for record in STUDY.records:
+        simple = simplified(STUDY.design, record.contacts)
+        found.append(port_matrix(build_circuit(simple.contacts, yarn_end_terminals(record.contacts.mesh))).conductance)
+    return found
+
+
+@pytest.mark.parametrize(("end", "factor"), [("p05", 1.18), ("p50", 1.0), ("p95", 0.82)])
+def test_corners_of_packings_that_differ_in_one_factor(corners: Path, end: str, factor: float) -> None:
+    """The percentiles of five equidistant factors lie at 0.05 and 0.95 of their range: 0.82 and 1.18."""
+    exact = [wanted(0)[place(pair)] / factor for pair in PAIRS]
+    np.testing.assert_allclose(answers(ohmmeter(corners, f"fabric_ports_{end}", PAIRS)), exact, rtol=EXACT)
+    strained = [wanted(2)[place(pair)] / factor for pair in PAIRS]
+    found = answers(ohmmeter(corners, f"fabric_ports_{end}_stretch_s", PAIRS, "strain=0.05"))
+    np.testing.assert_allclose(found, strained, rtol=SAMPLED)
+
+
+@pytest.mark.parametrize(
+    ("mc", "factor"),
+    [
+        (0.0, 1.0),
+        (-1.6448536269514722, 1.18),
+        (1.6448536269514722, 0.82),
+        (0.8224268134757361, 0.82**0.5),
+        (99.0, 0.82 ** (3 / 1.6448536269514722)),
+    ],
+)
+def test_the_parameter_of_monte_carlo_goes_from_corner_to_corner(corners: Path, mc: float, factor: float) -> None:
+    found = answers(ohmmeter(corners, "fabric_ports_mc_stretch_s", PAIRS, f"strain=0.05 mc={mc!r}"))
+    np.testing.assert_allclose(found, [wanted(2)[place(pair)] / factor for pair in PAIRS], rtol=SAMPLED)

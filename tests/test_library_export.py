@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from library_cases import CARD, study
 
-from circuittex.base.errors import CircuitError, CircuittexWarning, DesignError
+from circuittex.base.errors import CircuitError, CircuittexWarning, DesignError, StoreError
 from circuittex.command.cli import main
 from circuittex.command.exit_codes import ExitCode
 from circuittex.electrical.network.ports import PortMatrix, resistances
@@ -21,6 +21,7 @@ from circuittex.study.library.accuracy import compared
 from circuittex.study.library.cell import Cell, Pin
 from circuittex.study.library.export import export_library
 from circuittex.study.library.interpolation import pieces, value, without
+from circuittex.study.library.members import complete_members, is_ensemble
 from circuittex.study.library.network import Network, floating, ports_network
 from circuittex.study.library.parts import pins
 from circuittex.study.library.rating import rated_currents
@@ -70,6 +71,28 @@ def test_yarns_that_do_not_conduct_are_no_library(tmp_path: Path) -> None:
     cut = replace(cut, records=(replace(cut.records[0], ports=none),))
     with pytest.warns(CircuittexWarning), pytest.raises(CircuitError, match="no current passes"):
         export_library(cut, tmp_path)
+
+
+def test_an_ensemble_gives_corners_of_its_complete_members(tmp_path: Path) -> None:
+    whole = study(2)
+    for number, made in enumerate((replace(whole, records=whole.records[:1]), whole, whole)):
+        folder = tmp_path / "members" / f"{number:04d}"
+        folder.mkdir(parents=True)
+        write_study_start(folder / "results.h5", made)
+    assert is_ensemble(tmp_path)
+    assert len(list(complete_members(tmp_path))) == 2
+    assert main(["export", str(tmp_path), "--out", str(tmp_path / "lib")]) == ExitCode.DONE
+    written = {path.stem for path in (tmp_path / "lib" / "ngspice").iterdir()}
+    assert {"fabric_ports_p05", "fabric_ports_p95_shear_v", "fabric_ports_mc_stretch_s"} <= written
+    page = (tmp_path / "lib" / "datasheet.html").read_text("utf-8")
+    assert "Corners and Monte Carlo" not in page
+    assert "of 2 packings" in page
+
+
+def test_an_ensemble_without_a_complete_member_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "members").mkdir()
+    with pytest.raises(StoreError, match="no member of the ensemble has all its states"):
+        next(complete_members(tmp_path))
 
 
 def test_free_ends_have_the_terminals_as_pins(tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ GNUCAP = shutil.which("gnucap")
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("library")
-    export_library(study(), folder, thin=0.02)
+    export_library(study(), folder, thin=0.02, members=[study(), study()])
     return folder
 
 
@@ -165,7 +165,7 @@ def test_the_content_has_its_hash(library: Path) -> None:
 
 
 def test_names_are_the_same_for_another_state_and_study(library: Path, tmp_path: Path) -> None:
-    export_library(study(3), tmp_path, state="shear-0.025", thin=0.02)
+    export_library(study(3), tmp_path, state="shear-0.025", thin=0.02, members=[study(3)])
     assert {p.relative_to(tmp_path) for p in tmp_path.glob("*/*.lib")} == {
         p.relative_to(library) for p in library.glob("*/*.lib")
     }
@@ -213,7 +213,7 @@ def test_ngspice_runs_every_example(library: Path) -> None:
 def test_gnucap_reads_every_file_and_answers_as_ngspice(library: Path) -> None:
     """gnucap prints five digits, and its sources have a small resistance of their own."""
     decks = examples(library, "gnucap")
-    assert len(decks) == 4
+    assert len(decks) == 7
     for deck in decks:
         done = subprocess.run(
             [str(GNUCAP), "-b", deck.name], cwd=deck.parent, capture_output=True, text=True, timeout=SECONDS

@@ -249,7 +249,10 @@ def _ensemble(options: argparse.Namespace) -> ExitCode:
 
 
 def _export(options: argparse.Namespace) -> ExitCode:
-    study = _load(options.results)
+    from circuittex.study.library.members import complete_members, is_ensemble
+
+    several = is_ensemble(options.results)
+    study = next(complete_members(options.results)) if several else _load(options.results)
     _prepare(options.out)
     from circuittex.study.library.export import export_library
 
@@ -261,6 +264,7 @@ def _export(options: argparse.Namespace) -> ExitCode:
         ends=options.ends,
         thin=options.thin,
         rise=options.rise,
+        members=complete_members(options.results) if several else (),
     )
     print(f"{len(cells)} sub-circuits in {options.out}: see {options.out / 'datasheet.html'}")
     return ExitCode.DONE

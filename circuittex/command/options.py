@@ -213,7 +213,8 @@ def _add_export(commands: Commands) -> None:
         "Writes the sub-circuits of a computed study for ngspice, LTspice, Xyce and gnucap: the detailed network,\n"
         "its exact reduction to the pins, a cell of Ry and Rc, and one crossing; and for each loading the same with\n"
         "strain as a parameter (..._s) or as the voltage of a pin (..._v, 1 V for 100 %). Beside them examples that\n"
-        "run as they stand, library.json, and datasheet.html with the error of each level.",
+        "run as they stand, library.json, and datasheet.html with the error of each level. RESULTS may be the folder\n"
+        "of an ensemble: then there are also corners (_p05 _p50 _p95) and a parameter for Monte Carlo (mc).",
         "circuittex export results/plain_weave --out fabric_lib",
     )
     _add_results(parser)

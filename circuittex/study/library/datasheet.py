@@ -25,8 +25,8 @@ CAPTIONS = {
     "strain": "Change of the resistance between two pins, all others open: computed states and what the cells answer.",
     "network": "Medians of Ry and Rc of the fitted cell.",
 }
+NO_CORNERS = {"Corners and Monte Carlo": "not available: the library is made of one study, not of an ensemble"}
 MISSING = {
-    "Corners and Monte Carlo": "not available: the library is made of one study, not of an ensemble",
     "Two loadings at once": "not available: a part for each, since the states under both at once were not computed",
     "Temperature coefficient": "not available: the conductivities of the design do not depend on temperature",
     "Capacitance, inductance": "not available: the model has no answer",
@@ -52,7 +52,7 @@ def write_datasheet(
         cells=_cells(cells, networks),
         ratings=_ratings(study, known),
         rise=number(known.rise),
-        missing=MISSING,
+        missing=({} if len(known.reductions) > 2 else NO_CORNERS) | MISSING,
         figures=[picture(CAPTIONS[name], png) for name, png in pictures.items()],
         version=study.version,
     )

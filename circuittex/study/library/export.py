@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -24,7 +24,7 @@ from circuittex.study.library.examples import crimped_probe, example_deck
 from circuittex.study.library.facts import Facts, facts_of
 from circuittex.study.library.levels import CRIMPED, ENDS, FREE, detailed
 from circuittex.study.library.network import Network, floating
-from circuittex.study.library.parts import Part, fixed_parts, strained_parts, thin_part
+from circuittex.study.library.parts import Part, fixed_parts, strained_parts
 from circuittex.study.library.subcircuit import library_text
 from circuittex.study.plan import plan
 
@@ -42,18 +42,20 @@ def export_library(
     thin: float = 0.0,
     dialects: Sequence[str] = DIALECTS,
     rise: float = 10.0,
+    members: Iterable[Study] = (),
 ) -> tuple[Cell, ...]:
     """Write the sub-circuits of a study into `folder`, with library.json, examples and datasheet.html.
 
     Names of sub-circuits begin with `name` and are the same for every study and state. Cells in which strain is no
     input are of `state`, the first recorded one unless named. `ends`: see `ENDS`. With `thin` > 0 there are also ports
     with fewer resistors, whose resistances rise by at most that part. Ratings are for `rise` kelvin.
+    `members` of an ensemble, `study` among them, give corners: see `reduction.corners`.
 
     Raises `DesignError` for an argument and `CircuitError` for a study that cannot be used.
     """
     chosen = _checked(study, state, ends, thin, dialects, rise)
     _note_missing(study)
-    known = facts_of(study, ends, thin, rise)
+    known = facts_of(study, ends, thin, rise, members)
     word = safe_name(name) + ("_free" if ends == FREE else "")
     found = list(_parts(study, known, word, chosen, ends))
     folder = Path(folder)
@@ -119,11 +121,9 @@ def _note_missing(study: Study) -> None:
 def _parts(study: Study, known: Facts, word: str, chosen: int, ends: str) -> Iterator[Part]:
     design = study.design
     circuit = detailed(design, study.records[chosen], ends)
-    yield from fixed_parts(word, design, known.levels, chosen, circuit)
-    if known.thin:
-        yield thin_part(word, design, known.thin[chosen], known.thin_error)
+    yield from fixed_parts(word, design, known.levels, known.reductions, chosen, circuit)
     for path in known.paths:
-        yield from strained_parts(word, design, known.levels, path, {"_thin": known.thin} if known.thin else {})
+        yield from strained_parts(word, design, known.levels, known.reductions, path)
 
 
 def _write(folder: Path, study: Study, known: Facts, part: Part, dialect: str, chosen: int) -> Cell:
@@ -133,7 +133,7 @@ def _write(folder: Path, study: Study, known: Facts, part: Part, dialect: str, c
     notes = [("design", study.design.name), ("design hash", study.design_hash), ("state", state), *known.notes(part)]
     path = folder / cell.file
     path.parent.mkdir(parents=True, exist_ok=True)
-    _write_ascii(path, library_text(cell, part.network, notes))
+    _write_ascii(path, library_text(cell, part.network, notes, part.spread))
     return cell
 
 

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from circuittex.base.arrays import Floats
 from circuittex.base.frozen import frozen
-from circuittex.electrical.network.ports import PortMatrix, port_matrix
+from circuittex.electrical.network.ports import port_matrix
 from circuittex.results.records import Study
 from circuittex.study.library.accuracy import Errors, compared
 from circuittex.study.library.interpolation import without
-from circuittex.study.library.levels import CRIMPED, Levels, levels
+from circuittex.study.library.levels import CRIMPED, Levels, levels, port_matrices
 from circuittex.study.library.network import matrix_at, ports_network
 from circuittex.study.library.parts import Part
 from circuittex.study.library.rating import rated_currents
+from circuittex.study.library.reduction import Reduction, corners, exact, thin
 from circuittex.study.library.strain_path import StrainPath, paths
-from circuittex.study.library.thinning import thinned
 
 GOOD = 0.01
 """A level is recommended where no pair of pins in any state errs by more, in resistance and in its change."""
@@ -29,10 +31,8 @@ class Facts:
 
     levels: Levels
     """What stands between the pins in every state."""
-    thin: tuple[PortMatrix, ...]
-    """(S,) the ports without those resistors that matter least; empty unless asked for."""
-    thin_error: float
-    """By which part a resistance of these may rise."""
+    reductions: tuple[Reduction, ...]
+    """Of the ports: the exact one, a thinned one where asked for, and the corners of an ensemble."""
     paths: tuple[StrainPath, ...]
     """The ways along which strain is an input."""
     errors: dict[str, Errors]
@@ -55,32 +55,35 @@ class Facts:
     def notes(self, part: Part) -> list[tuple[str, str]]:
         """What the comments of a file say of its errors."""
         found = [("yarn ends", JOINED if self.ends == CRIMPED else APART)]
-        level = "ports_thin" if "ports_thin" in part.name else part.level
+        level = part.level + part.end
         if level in self.errors:
             found.append(("errors over all pairs of pins and all states", _words(self.errors[level])))
-        elif part.level == "ports":
+        elif level == "ports":
             found.append(("errors", "none: the exact reduction of the detailed network to its pins"))
         if part.path in self.left_out:
-            found.append(("errors of each inner state interpolated from the others", _words(self.left_out[part.path])))
+            found.append(("errors of ports at inner states by all others", _words(self.left_out[part.path])))
         if part.path:
             low, high = part.network.strain[[0, -1]].tolist()
             found.append(("strain", f"from {low!r} to {high!r}; beyond, the last values, and out_of_range is 1 V"))
         return found
 
 
-def facts_of(study: Study, ends: str, thin: float, rise: float) -> Facts:
-    """Reduce, fit, thin and compare."""
+def facts_of(study: Study, ends: str, error: float, rise: float, members: Iterable[Study]) -> Facts:
+    """Reduce, fit, thin where an error is allowed, find the corners of `members`, and compare."""
     known = levels(study, ends)
     errors = {}
     if not known.reason:
         found = [port_matrix(circuit, known.pins) for circuit in known.cells]
         errors["cell"] = compared(known.ports, found)
-    less = thinned(known.ports, thin) if thin else ()
-    if less:
-        errors["ports_thin"] = compared(known.ports, less)
+    reductions = [exact(known.ports)]
+    if error:
+        reductions.append(thin(known.ports, error))
+        errors["ports_thin"] = compared(known.ports, reductions[-1].ports)
+    if packings := [port_matrices(member, ends, known.pins) for member in members]:
+        reductions += corners(packings)
     ways = paths(study)
     left = {way.word: _left_out(known, way) for way in ways if len(way.strain) > 2}
-    return Facts(known, less, thin, ways, errors, left, rise, rated_currents(study, rise), ends)
+    return Facts(known, tuple(reductions), ways, errors, left, rise, rated_currents(study, rise), ends)
 
 
 def _left_out(known: Levels, way: StrainPath) -> Errors:

@@ -64,14 +64,24 @@ def levels(study: Study, ends: str) -> Levels:
     pins = tuple(name for name, there in zip(matrices[0].ports, joined, strict=True) if there)
     if not pins:
         raise CircuitError(f"no current passes between any two pins ({ends} yarn ends): there is nothing to export")
-    kept = np.ix_(joined, joined)
-    ports = tuple(PortMatrix(pins, matrix.conductance[kept]) for matrix in matrices)
+    ports = tuple(_kept(matrix, pins) for matrix in matrices)
     fit = _fitted(study, ports) if ends == CRIMPED else NO_CELL
     if isinstance(fit, str):
         warnings.warn(f"no cell of Ry and Rc: {fit}", CircuittexWarning, stacklevel=3)
         n, m = len(study.design.weave.warp), len(study.design.weave.weft)
         return Levels(pins, ports, np.empty((0, n + m)), np.empty((0, n, m)), fit)
     return Levels(pins, ports, *fit, "")
+
+
+def port_matrices(study: Study, ends: str, pins: Sequence[str]) -> tuple[PortMatrix, ...]:
+    """(S,) the exact reductions of a study to these pins."""
+    return tuple(_kept(_ports(study.design, record, ends), pins) for record in study.records)
+
+
+def _kept(matrix: PortMatrix, pins: Sequence[str]) -> PortMatrix:
+    """A port matrix with these of its ports; the others carry no current."""
+    place = [matrix.ports.index(name) for name in pins]
+    return PortMatrix(tuple(pins), matrix.conductance[np.ix_(place, place)])
 
 
 NO_CELL = "its pins are yarn ends whose fibrils are joined, and with free ends the pins are the terminals"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -12,18 +12,18 @@ from circuittex.base.errors import CircuitError, CircuittexWarning
 from circuittex.base.frozen import frozen
 from circuittex.design import Design
 from circuittex.electrical.network.circuit import Circuit, yarn_end_name
-from circuittex.electrical.network.ports import PortMatrix
 from circuittex.study.library.cell import Pin
 from circuittex.study.library.levels import Levels
-from circuittex.study.library.network import FLAG, STRAIN, Network, circuit_network, pin_words, ports_network
+from circuittex.study.library.network import FLAG, SPREAD, STRAIN, Network, circuit_network, pin_words, ports_network
+from circuittex.study.library.reduction import CORNERS, Reduction
 from circuittex.study.library.strain_path import StrainPath
 
 PARAMETER, PIN = "_s", "_v"
 """How names of cells end whose strain is a parameter, and a pin."""
 UNIT = ("w", "e", "n", "s")
+FLAGGED = Pin(FLAG, "bottom", "flag")
 TITLES = {
     "detailed": "every fibril segment and contact",
-    "ports": "exact reduction to the pins",
     "cell": "Ry for each yarn segment and Rc for each crossing, fitted to all pairs of pins",
     "unit": "one crossing amid a wide fabric: arms Ry/2 of its warp (w, e) and of its weft (n, s), Rc between them",
 }
@@ -37,6 +37,8 @@ class Part:
     """Of the sub-circuit."""
     level: str
     """'detailed', 'ports', 'cell' or 'unit'."""
+    end: str
+    """Of the reduction of its ports, such as '_thin'; empty for the exact one and for other levels."""
     title: str
     """What it is, one line."""
     network: Network
@@ -47,52 +49,77 @@ class Part:
     """Name and default."""
     path: str
     """Word of the path along which strain is an input; empty where it is none."""
+    spread: tuple[Network, Network] | None = None
+    """The networks at the 5th and the 95th percentile of resistance, where the place among them is a parameter."""
 
 
-def fixed_parts(name: str, design: Design, known: Levels, state: int, circuit: Circuit) -> Iterator[Part]:
+def fixed_parts(
+    name: str, design: Design, known: Levels, reductions: Sequence[Reduction], state: int, circuit: Circuit
+) -> Iterator[Part]:
     """Every level in one state; `circuit` is its detailed one."""
     nothing = np.zeros(1)
-    networks = {
-        "detailed": circuit_network([circuit], nothing, known.pins),
-        "ports": ports_network([known.ports[state]], nothing),
-    }
+    yield _fixed(name, design, "detailed", "", TITLES["detailed"], circuit_network([circuit], nothing, known.pins))
+    for each in reductions:
+        yield _fixed(name, design, "ports", each.end, each.title, ports_network([each.ports[state]], nothing))
     if not known.reason:
-        networks["cell"] = circuit_network([known.cells[state]], nothing, known.pins)
-        networks["unit"] = unit_network(known.units[[state]], nothing)
-    for level, network in networks.items():
-        yield Part(f"{name}_{level}", level, TITLES[level], network, pins(design, network), (), "")
+        network = circuit_network([known.cells[state]], nothing, known.pins)
+        yield _fixed(name, design, "cell", "", TITLES["cell"], network)
+        yield _fixed(name, design, "unit", "", TITLES["unit"], unit_network(known.units[[state]], nothing))
 
 
-def thin_part(name: str, design: Design, matrix: PortMatrix, error: float) -> Part:
-    """The ports in one state without the resistors that matter least."""
-    network = ports_network([matrix], np.zeros(1))
-    title = f"reduction to the pins, every resistance exact to {error:.3g}"
-    return Part(f"{name}_ports_thin", "ports", title, network, pins(design, network), (), "")
+def _fixed(name: str, design: Design, level: str, end: str, title: str, network: Network) -> Part:
+    return Part(f"{name}_{level}{end}", level, end, title, network, pins(design, network), (), "")
 
 
 def strained_parts(
-    name: str, design: Design, known: Levels, path: StrainPath, thin: Mapping[str, Sequence[PortMatrix]]
+    name: str, design: Design, known: Levels, reductions: Sequence[Reduction], path: StrainPath
 ) -> Iterator[Part]:
-    """Ports, cell and unit with strain as a parameter and as a pin; `thin`: further reductions by the end of a name."""
-    networks = {("ports", ""): ports_network([known.ports[k] for k in path.records], path.strain)}
-    for end, matrices in thin.items():
-        networks["ports", end] = ports_network([matrices[k] for k in path.records], path.strain)
-    if not known.reason:
-        cells = known.cells
-        try:
-            networks["cell", ""] = circuit_network([cells[k] for k in path.records], path.strain, known.pins)
-            networks["unit", ""] = unit_network(known.units[path.records], path.strain)
-        except CircuitError as error:
-            warnings.warn(f"no cell of Ry and Rc for {path.loading!r}: {error}", CircuittexWarning, stacklevel=3)
-    for (level, end), network in networks.items():
-        title = f"{TITLES[level]}, strain of the loading as"
-        base, plain = f"{name}_{level}{end}_{path.word}", pins(design, network)
-        flag, strain = Pin(FLAG, "bottom", "flag"), Pin(STRAIN, "bottom", "control")
-        given = ((STRAIN, "0"),)
-        yield Part(base + PARAMETER, level, f"{title} a parameter", network, (*plain, flag), given, path.word)
-        yield Part(
-            base + PIN, level, f"{title} a voltage (1 V = 100 %)", network, (*plain, strain, flag), (), path.word
-        )
+    """Ports, cell and unit with strain as a parameter and as a pin, and the ports with a place among the corners."""
+    networks = {each.end: ports_network([each.ports[k] for k in path.records], path.strain) for each in reductions}
+    for each in reductions:
+        yield from _strained(name, design, "ports", each.end, each.title, networks[each.end], path)
+    if set(CORNERS) <= set(networks):
+        yield from _monte_carlo(name, design, [networks[end] for end in CORNERS], path)
+    if known.reason:
+        return
+    try:
+        cells = [known.cells[k] for k in path.records]
+        found = {
+            "cell": circuit_network(cells, path.strain, known.pins),
+            "unit": unit_network(known.units[path.records], path.strain),
+        }
+    except CircuitError as error:
+        warnings.warn(f"no cell of Ry and Rc for {path.loading!r}: {error}", CircuittexWarning, stacklevel=3)
+        return
+    for level, network in found.items():
+        yield from _strained(name, design, level, "", TITLES[level], network, path)
+
+
+def _monte_carlo(name: str, design: Design, corners: Sequence[Network], path: StrainPath) -> Iterator[Part]:
+    """The ports with a place among the corners as a parameter beside the strain."""
+    low, middle, high = corners
+    if not low.names == middle.names == high.names:
+        text = f"no part with the parameter {SPREAD} for {path.loading!r}: some packings lack resistors of others"
+        warnings.warn(text, CircuittexWarning, stacklevel=3)
+        return
+    title = f"reduction to the pins, parameters: strain, and {SPREAD} in standard deviations of all resistors at once"
+    given = ((STRAIN, "0"), (SPREAD, "0"))
+    full = f"{name}_ports_{SPREAD}_{path.word}{PARAMETER}"
+    yield Part(
+        full, "ports", f"_{SPREAD}", title, middle, (*pins(design, middle), FLAGGED), given, path.word, (low, high)
+    )
+
+
+def _strained(
+    name: str, design: Design, level: str, end: str, title: str, network: Network, path: StrainPath
+) -> Iterator[Part]:
+    """Strain as a parameter and as a pin."""
+    base, plain = f"{name}_{level}{end}_{path.word}", pins(design, network)
+    what = f"{title}, strain of the loading as a"
+    given = ((STRAIN, "0"),)
+    yield Part(base + PARAMETER, level, end, f"{what} parameter", network, (*plain, FLAGGED), given, path.word)
+    control = (*plain, Pin(STRAIN, "bottom", "control"), FLAGGED)
+    yield Part(base + PIN, level, end, f"{what} voltage (1 V = 100 %)", network, control, (), path.word)
 
 
 def unit_network(values: Floats, strain: Floats) -> Network:

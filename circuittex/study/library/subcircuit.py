@@ -15,17 +15,29 @@ from circuittex.electrical.network.names import unique_names
 from circuittex.study.library.cell import Cell
 from circuittex.study.library.dialect import DIALECTS, Dialect
 from circuittex.study.library.interpolation import Pieces, pieces
-from circuittex.study.library.network import CONTROLS, FLAG, STRAIN, USED, Network
+from circuittex.study.library.network import CONTROLS, FLAG, SPREAD, SPREAD_USED, STRAIN, USED, Network
 
 SLACK = 1e-6
 """A strain this part of the range beyond its ends is at the end: a source's rounding raises no flag."""
+NORMAL = 1.6448536269514722
+"""The 95th percentile of the standard normal distribution."""
+FURTHEST = 3.0
+"""Standard deviations beyond which the parameter mc changes nothing."""
 OPEN = 1e9
 """ohm between the pin of strain and ground: left open it is 0."""
 
 
-def library_text(cell: Cell, network: Network, notes: Sequence[tuple[str, str]]) -> str:
-    """One file: comments with `notes` (key, text) of which no text can become a card, then the sub-circuit."""
-    body = "\n".join(_subcircuit(cell, network))
+def library_text(
+    cell: Cell,
+    network: Network,
+    notes: Sequence[tuple[str, str]],
+    spread: tuple[Network, Network] | None = None,
+) -> str:
+    """One file: comments with `notes` (key, text) of which no text can become a card, then the sub-circuit.
+
+    `spread`: the networks at the 5th and 95th percentile of resistance, where the place among them is a parameter.
+    """
+    body = "\n".join(_subcircuit(cell, network, spread))
     digest = hashlib.sha256(body.encode("ascii")).hexdigest()
     head = [
         f"* circuittex {__version__} library: {cell.name}",
@@ -37,7 +49,7 @@ def library_text(cell: Cell, network: Network, notes: Sequence[tuple[str, str]])
     return "\n".join([*head, body, ""])
 
 
-def _subcircuit(cell: Cell, network: Network) -> list[str]:
+def _subcircuit(cell: Cell, network: Network, spread: tuple[Network, Network] | None) -> list[str]:
     dialect = DIALECTS[cell.dialect]
     card = [".subckt", cell.name, *(pin.name for pin in cell.pins)]
     if cell.parameters:
@@ -45,6 +57,8 @@ def _subcircuit(cell: Cell, network: Network) -> list[str]:
     lines = [" ".join(card), *(f"* pin: {pin.name} {pin.kind} {pin.side}" for pin in cell.pins)]
     if len(network.strain) == 1:
         lines += _fixed(network)
+    elif spread is not None:
+        lines += _by_spread(network, *spread, dialect)
     else:
         lines += _by_parameter(network, dialect) if cell.parameters else _by_pin(network, dialect)
     return [*lines, f".ends {cell.name}"]
@@ -90,6 +104,23 @@ def _by_parameter(network: Network, dialect: Dialect) -> list[str]:
         for name, (a, b), k in zip(known.devices, network.nodes, known.own.tolist(), strict=True)
     ]
     return [*lines, f"V{FLAG} {FLAG} 0 {{{_outside(STRAIN, known.pieces, dialect)}}}"]
+
+
+def _by_spread(network: Network, low: Network, high: Network, dialect: Dialect) -> list[str]:
+    """As `_by_parameter`, and the logarithm of every resistance goes with the parameter mc from that of the median
+    towards that of its 5th percentile (mc = -1.645) or its 95th (1.645), and straight on as far as `FURTHEST`."""
+    lines = [f".param {SPREAD_USED}={{min(max({SPREAD},-{FURTHEST!r}),{FURTHEST!r})/{NORMAL!r}}}"]
+    found = pieces(network.strain, network.conductance)
+    lines.append(f".param {USED}={{{_clamped(STRAIN, found)}}}")
+    for k, (name, (a, b)) in enumerate(zip(network.names, network.nodes, strict=True)):
+        words = [f"{kind}_{k + 1}" for kind in ("middle", "low", "high")]
+        for word, each in zip(words, (network, low, high), strict=True):
+            own = pieces(each.strain, each.conductance[:, [k]])
+            lines.append(f".param {word}={{{_log_conductance(own, 0, USED, dialect)}}}")
+        middle, lower, upper = words
+        share = dialect.choose(f"{SPREAD_USED}<0", f"{middle}-{lower}", f"{upper}-{middle}")
+        lines.append(f"R{name} {a} {b} {{exp(-{middle}-{SPREAD_USED}*{share})}}")
+    return [*lines, f"V{FLAG} {FLAG} 0 {{{_outside(STRAIN, found, dialect)}}}"]
 
 
 def _by_pin(network: Network, dialect: Dialect) -> list[str]:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from library_cases import CARD, pins_of, study
 
 from circuittex.electrical.network.names import safe_name
-from circuittex.electrical.spice.ngspice import TROUBLE, find_ngspice, run_deck
+from circuittex.electrical.spice.ngspice import TROUBLE, find_ngspice, read_raw, run_deck
 from circuittex.study.library.cell import DIALECTS, Cell, Pin
 from circuittex.study.library.export import export_library
 from circuittex.study.library.network import Network
@@ -207,6 +207,28 @@ def test_ngspice_runs_every_example(library: Path) -> None:
         assert done.returncode == 0
         assert not [line for line in said if TROUBLE.search(line)], deck.name
         assert deck.name.startswith("probe") or "i_stretched" in done.stdout or "v1#branch" in done.stdout
+
+
+@pytest.mark.parametrize("dialect", ["ltspice", "xyce"])
+def test_ngspice_that_follows_ltspice_runs_the_examples_of_others(
+    library: Path, dialect: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """ngspice's mode for LTspice and PSpice knows if(), braces in sources and PARAMS: as these do.
+
+    Not the programs themselves, but no reader of ours either; the answers are those of the files for ngspice.
+    """
+    (tmp_path / ".spiceinit").write_text("set ngbehavior=ltpsa\n", encoding="ascii")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    decks = examples(library, dialect)
+    assert len(decks) > 20
+    for deck in decks:
+        raw = tmp_path / f"{deck.stem}.raw"
+        command = [str(find_ngspice()), "-b", "-r", str(raw), deck.name]
+        done = subprocess.run(command, cwd=deck.parent, capture_output=True, text=True, timeout=SECONDS)
+        assert "Compatibility modes selected: ps lt" in done.stdout + done.stderr
+        own = (library / "examples" / deck.name.replace(dialect, "ngspice")).read_text("ascii")
+        found, wanted = read_raw(raw)[-1], run_deck(own.replace("../", f"{library}/")).plots[-1]
+        np.testing.assert_allclose(found.current("v1"), wanted.current("v1"), rtol=1e-9)
 
 
 @pytest.mark.skipif(GNUCAP is None, reason="gnucap is not installed; `.ci/setup gnucap` does it")

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
+import library_cases as cases
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -24,6 +25,7 @@ SCRIPTS = [
     "dolfinx_beam",
     "invariance",
     "kills",
+    "library",
     "mesh_study",
     "netlist",
     "network",
@@ -113,6 +115,18 @@ def test_netlist_against_pyspice_up_to_its_limit(monkeypatch: pytest.MonkeyPatch
     assert "-" not in row
     monkeypatch.setattr(netlist, "LARGEST", 10)
     assert netlist.compare(reduced_circuit((2, 2), 1.0, 1.0), 1).count("-") == 2
+
+
+def test_library_measures_every_level() -> None:
+    library = script("library")
+    study = cases.study(2)
+    assert [row[0] for row in library.errors(study).rows] == ["cell"], "two states leave nothing to interpolate"
+    ((state, difference),) = library.difference(study, 1).rows
+    assert state == "relaxed"
+    assert difference < 1e-9
+    rows = library.transients(study).rows
+    assert len(rows) == 4 + 2 * 4
+    assert rows[0][0] == "fabric_detailed"
 
 
 def test_ready_words_are_the_cards_of_the_deck() -> None:

@@ -60,9 +60,7 @@ def owners(panel: Panel, gone: Severed, conducts: tuple[Flags, Flags]) -> Owners
             if not usable.any():
                 raise refuse(f"{at}.edge", electrode.edge, "every yarn end there is cut off or insulating")
             if not usable.all():
-                notes.append(
-                    f"{at}: {int((~usable).sum())} yarn ends of the {electrode.edge} edge are cut off or insulating"
-                )
+                notes.append(f"{at}: {int((~usable).sum())} of its yarn ends are cut off or insulating")
             _claim(ends[way][:, side], usable, number, panel.electrodes, electrode.edge)
         if electrode.rectangle is not None:
             box = within(panel, electrode.rectangle)

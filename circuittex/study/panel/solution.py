@@ -16,6 +16,8 @@ _CHUNK = 1 << 18
 """Resistors whose drops for all electrodes are held at once."""
 _UNBALANCED = 1e-6
 """Part of the power that may be lost in rounding."""
+_NOTHING = 16.0 * float(np.finfo(float).eps)
+"""Of voltages and conductances: what is below is rounding, and so is its heat."""
 
 
 @frozen
@@ -100,7 +102,7 @@ def solve_panel(panel: Panel, method: str = "auto") -> PanelSolution:
     padded = np.append(across, np.nan)
     warp_voltage, weft_voltage = padded[wiring.node]
     heat, along = _flows(wiring, basis, above)
-    _refuse_unbalanced(wiring, heat, float(current @ above))
+    _refuse_unbalanced(wiring, ports, heat, float(current @ above), float(np.abs(above).max()))
     return PanelSolution(
         wiring=wiring,
         basis=basis,
@@ -167,11 +169,11 @@ def _potentials(G: Floats, amperes: Floats, volts: Floats, free: Floats, held: F
     return np.asarray(middle + scale * np.linalg.solve(matrix, scale * right))
 
 
-def _refuse_unbalanced(wiring: Wiring, heat: Floats, power: float) -> None:
+def _refuse_unbalanced(wiring: Wiring, ports: PortMatrix, heat: Floats, power: float, span: float) -> None:
     """Raise where the heat of the resistors is not what the electrodes feed in: their drops are lost in rounding."""
-    total = float(heat.sum())
-    if not abs(total - power) <= _UNBALANCED * max(abs(power), total):
-        ohm = wiring.resistance
+    total, ohm = float(heat.sum()), wiring.resistance
+    nothing = (_NOTHING**2 * float((1.0 / ohm).sum()) + _NOTHING * float(np.trace(ports.conductance))) * span**2
+    if not abs(total - power) <= max(_UNBALANCED * max(abs(power), total), nothing):
         raise CircuitError(
             f"the cells turn {total:.6g} W into heat but {power:.6g} W are fed in: resistances from {ohm.min():.1e} to "
             f"{ohm.max():.1e} ohm are too far apart for a nodal solution"

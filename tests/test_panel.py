@@ -429,3 +429,16 @@ def test_multigrid_agrees_with_the_factorisation() -> None:
     assert multigrid.residual < 1e-10
     np.testing.assert_allclose(multigrid.ports.conductance, direct.ports.conductance, rtol=SOLVED)
     np.testing.assert_allclose(multigrid.warp_voltage, direct.warp_voltage, rtol=SOLVED)
+
+
+def test_a_panel_in_which_nothing_flows_is_not_refused() -> None:
+    """Two parts at one voltage each, with open electrodes on them: all that is left is rounding."""
+    ends = (
+        Electrode("a", ends=("warp1..2-",), voltage=5.0),
+        Electrode("b", ends=("warp4..5-",), voltage=0.0),
+        Electrode("open", rectangle=(3.0, 0.0, 4.0, 2.0)),
+    )
+    found = solve_panel(panel((5, 7), insulating=("warp3",), cuts=(Cut(line=((0, 2.5), (7, 2.5))),), electrodes=ends))
+    assert found.voltage == pytest.approx([5.0, 0.0, 5.0])
+    assert np.abs(found.current).max() < 1e-13
+    assert np.isinf(found.resistance[0, 1])

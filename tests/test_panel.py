@@ -128,13 +128,14 @@ def test_ladder_of_two_yarns() -> None:
     np.testing.assert_allclose(drop / drop[0], shape / shape[0], rtol=1e-11)
 
 
-def test_the_reduced_network_of_a_cell_is_a_panel() -> None:
-    """All 16 yarn ends of a 4 x 4 cell with its own Ry of each yarn and Rc of each crossing, by other code."""
+@pytest.mark.parametrize("n", [4, 16])
+def test_the_reduced_network_of_a_cell_is_a_panel(n: int) -> None:
+    """All 16 or 64 yarn ends, with an Ry of each yarn and an Rc of each crossing, reduced by other code."""
     rng = np.random.default_rng(1)
-    Ry, Rc = rng.uniform(0.2, 0.4, 8), rng.uniform(1.0, 9.0, (4, 4))
-    law = CellResistances(Ry[None, :4, None], Ry[None, None, 4:], Rc)
-    found = solve_panel(panel((4, 4), law, electrodes=end_electrodes(4, 4)))
-    wanted = port_matrix(reduced_circuit((4, 4), Ry, Rc))
+    Ry, Rc = rng.uniform(0.2, 0.4, 2 * n), rng.uniform(1.0, 9.0, (n, n))
+    law = CellResistances(Ry[None, :n, None], Ry[None, None, n:], Rc)
+    found = solve_panel(panel((n, n), law, electrodes=end_electrodes(n, n)))
+    wanted = port_matrix(reduced_circuit((n, n), Ry, Rc))
     assert found.ports.ports == wanted.ports
     np.testing.assert_allclose(found.ports.conductance, wanted.conductance, rtol=1e-11, atol=1e-15)
 
@@ -393,6 +394,8 @@ def test_a_floating_electrode_is_reported() -> None:
     assert np.isnan(found.weft_voltage[:, 2]).all()
     assert np.isfinite(found.warp_voltage).all()
     assert any("open: no driven electrode reaches" in note for note in found.notes)
+    (plot,) = run_deck(panel_netlists(found).deck).plots  # which has no answer where a part floats
+    assert -float(plot.current("vleft")[0]) == pytest.approx(found.current[0], rel=SOLVED)
     assert np.isinf(found.resistance[0, 1])
 
 

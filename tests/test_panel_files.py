@@ -147,6 +147,12 @@ def test_refusal_names_the_field_the_value_and_what_is_allowed(old: str, new: st
     assert [word for word in words if word not in message] == [], message
 
 
+def test_more_voltages_than_memory_are_refused() -> None:
+    ends = tuple(Electrode(f"e{k}", ends=(f"warp{k + 1}-",)) for k in range(100))
+    with pytest.raises(DesignError, match=r"electrodes: 100 .* 2000 x 2000 cells has at most 62"):
+        Panel((2000, 2000), CellResistances(1.0, 1.0, 1.0), ends)
+
+
 def test_current_with_no_way_back_is_refused() -> None:
     """Insulated from each other, the fed yarn leads to no electrode at a voltage."""
     ends = (

@@ -62,7 +62,7 @@ def panel_netlists(solution: PanelSolution) -> PanelNetlists:
     what = f"panel of {rows} x {columns} crossings"
     circuit = panel_circuit(solution.wiring)
     whole = subcircuit(circuit, name, Header(title=what, design=panel.name, notes=solution.notes))
-    return PanelNetlists(whole, ports_netlist(solution), _deck(panel, name, pin_names(circuit), whole, what))
+    return PanelNetlists(whole, ports_netlist(solution), _deck(solution, name, pin_names(circuit), whole, what))
 
 
 def ports_netlist(solution: PanelSolution) -> str:
@@ -78,14 +78,17 @@ def subcircuit_name(panel: Panel) -> str:
     return safe_name(f"panel {panel.name}")
 
 
-def _deck(panel: Panel, name: str, pins: tuple[str, ...], whole: str, what: str) -> str:
+def _deck(solution: PanelSolution, name: str, pins: tuple[str, ...], whole: str, what: str) -> str:
     """The sub-circuit, a call of it, and a source for each electrode that is driven; open ones hang on nothing else."""
+    panel = solution.wiring.panel
     lines = [f"* {what}: a deck that runs as it stands", whole.rstrip(), f"Xpanel {' '.join(pins)} {name}"]
-    for pin, electrode in zip(pins, panel.electrodes, strict=True):
+    for pin, electrode, volts in zip(pins, panel.electrodes, solution.voltage.tolist(), strict=True):
         if electrode.voltage is not None:
             lines.append(f"V{pin} {pin} 0 {electrode.voltage!r}")
         elif electrode.current:
             lines.append(f"I{pin} 0 {pin} {electrode.current!r}")
+        elif volts != volts:  # no simulator answers where a part floats
+            lines += ["* floats: nothing that is driven reaches it", f"Rfloat_{pin} {pin} 0 1e9"]
     return "\n".join([*lines, ".op", ".end"]) + "\n"
 
 

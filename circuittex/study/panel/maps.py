@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from circuittex.base.arrays import Floats
+from circuittex.base.errors import DesignError
 from circuittex.design.checks import refuse
 from circuittex.design.table import Table, quantity
 from circuittex.study.panel.formula import evaluate
@@ -106,6 +107,8 @@ def _loaded(path: Path, field: str, load: Callable[[], Floats]) -> Floats:
         return np.asarray(load())
     except FileNotFoundError:
         raise refuse(field, str(path), "there is no such file") from None
-    except (OSError, ValueError, SyntaxError, EOFError) as error:
+    except DesignError:
+        raise
+    except Exception as error:  # readers of foreign files raise whatever they like on what they cannot read
         reason = (str(error).strip() or type(error).__name__).splitlines()[0]
         raise refuse(field, path.name, f"it cannot be read: {reason}") from None

@@ -16,6 +16,8 @@ from circuittex.study.panel.cells import OUTSIDE, CellResistances
 MOST_CELLS = 5_000_000
 """Cells of a panel: 15 million resistors, which take some GB."""
 MOST_ELECTRODES = 512
+MOST_VALUES = 500_000_000
+"""Voltages that are kept, one at every node for each electrode: 4 GB."""
 EDGES = ("left", "right", "bottom", "top")
 """Edges of a panel: the minus and plus ends of all warp yarns, and those of all weft yarns."""
 _YARNS = re.compile(r"(warp|weft)([1-9][0-9]{0,8})(?:\.\.([1-9][0-9]{0,8}))?([+-]?)", re.ASCII)
@@ -172,6 +174,9 @@ class Panel:
             raise refuse("electrodes", "nothing", "a panel needs at least one electrode")
         if len(electrodes) > MOST_ELECTRODES:
             raise refuse("electrodes", len(electrodes), f"a panel has at most {MOST_ELECTRODES}")
+        most = MOST_VALUES // (2 * shape[0] * shape[1])
+        if len(electrodes) > most:
+            raise refuse("electrodes", len(electrodes), f"a panel of {shape[0]} x {shape[1]} cells has at most {most}")
         distinct(tuple(each.name for each in electrodes), "electrodes")
         store(
             self,

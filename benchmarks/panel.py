@@ -4,9 +4,10 @@
 
 Panels of n x n crossings, Ry = 0.28 ohm, fed from their left to their right edge, with a slanting cut that sends the
 current through the crossings; and the same fed through 16 electrodes. Each case runs in a process of its own, which
-tells its peak memory. 'own' is circuittex's Cholesky, 'SuperLU' SciPy's by minimum degree as panels use it, 'multigrid'
-pyamg's Ruge-Stuben as a preconditioner. Seconds are those of the processor, for assembly, factorisation or set-up, and
-all solutions, all with a relative residual below 1e-10; writing is that of the panel's sub-circuit as text.
+tells its peak memory. 'own' is circuittex's Cholesky, 'CHOLMOD' that of scikit-sparse where it is installed, 'SuperLU'
+SciPy's by minimum degree as panels use it, 'multigrid' pyamg's Ruge-Stuben as a preconditioner. Seconds are those of
+the processor, for assembly, factorisation or set-up, and all solutions, all with a relative residual below 1e-10;
+writing is that of the panel's sub-circuit as text.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -31,7 +33,7 @@ from circuittex.study.panel.statement import Cut, Electrode, Panel
 from circuittex.study.panel.wiring import wire
 
 HEAD = ["Rc, ohm", "resistors", "electrodes", "method", "seconds", "writing, s", "solving / writing", "residual", "MB"]
-METHODS = ("own", "SuperLU", "multigrid")
+METHODS = ("own", *["CHOLMOD"] * (find_spec("sksparse") is not None), "SuperLU", "multigrid")
 WRITTEN = 2_000_000
 """Resistors beyond which the time of writing is extrapolated in proportion: text and names of 10 million take 8 GB."""
 
@@ -59,12 +61,20 @@ def own(matrix: Any) -> Callable[[Any], Any]:
     return lambda right: np.stack([solve(column) for column in right.T], axis=1)
 
 
+def cholmod(matrix: Any) -> Callable[[Any], Any]:
+    """CHOLMOD with its own choice of order and of fronts."""
+    from sksparse.cholmod import cholesky
+
+    factor = cholesky(matrix.tocsc())
+    return lambda right: factor(right)
+
+
 def case(n: int, electrodes: int, Rc: float, method: str) -> dict[str, float]:
     """Seconds, residual and peak memory of one solution."""
     wiring = wire(panel(n, electrodes, Rc))
     if method == "own":
         factorise(laplacian._matrix(*_chain()))  # compiled before the clock starts
-        laplacian._direct = own
+    laplacian._direct = {"own": own, "CHOLMOD": cholmod}.get(method, laplacian._direct)
     how = "multigrid" if method == "multigrid" else "direct"
     clock = time.process_time()
     found = laplacian.responses(wiring.ends, 1.0 / wiring.resistance, wiring.n_nodes, electrodes, how)

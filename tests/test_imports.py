@@ -56,6 +56,9 @@ ALLOWED: dict[str, set[str]] = {
         *{"design", "geometry", "fit", "study", "results", "results.store"},
         *{"results.plot.style", "results.report.number", "results.report.page", "results.report.template"},
     },
+    "study.panel": {
+        *{"design", "solvers", "electrical.network", "netlist", "results", "results.store", "results.plot.style"},
+    },
 }
 ANYTHING = {"command", "__main__"}  # the command line, which nobody imports
 
@@ -71,7 +74,8 @@ LIBRARIES: dict[str, set[str]] = {
     "jinja2": {"results.report"},
     "filelock": {"base"},
     "meshio": {"results.vtk"},
-    "matplotlib": {"results.plot", "study.ensemble"},
+    "matplotlib": {"results.plot", "study.ensemble", "study.panel"},
+    "pyamg": {"solvers"},
     "distributed": {"study.ensemble"},
     "dask": {"study.ensemble"},
 }
@@ -199,6 +203,7 @@ HEAVY = [
     "pypardiso",
     "dask",
     "jinja2",
+    "pyamg",
 ]
 
 

@@ -1,4 +1,4 @@
-"""The command line: new, run, netlist, verify, report, ensemble."""
+"""The command line: new, run, netlist, verify, report, ensemble, panel."""
 
 from __future__ import annotations
 
@@ -248,6 +248,25 @@ def _ensemble(options: argparse.Namespace) -> ExitCode:
     return ExitCode.PARTLY if ensemble.count.any() else ExitCode.NO_EQUILIBRIUM
 
 
+def _panel(options: argparse.Namespace) -> ExitCode:
+    from circuittex.study.panel.gradient import panel_gradient
+    from circuittex.study.panel.output import table, write_panel
+    from circuittex.study.panel.reader import load_panel
+    from circuittex.study.panel.solution import solve_panel
+
+    panel, pairs = load_panel(options.panel)
+    folder = options.out or Path("results", options.panel.stem)
+    _prepare(folder)
+    solution = solve_panel(panel)
+    notes = write_panel(folder, solution, tuple(panel_gradient(solution, *pair) for pair in pairs))
+    if not options.quiet:
+        print(table(solution))
+        print(f"\nresults: {folder}")
+    for note in notes:
+        print(f"circuittex: note: {note}", file=sys.stderr)
+    return ExitCode.DONE
+
+
 COMMANDS: dict[str, Callable[[argparse.Namespace], ExitCode]] = {
     "new": _new,
     "run": _run,
@@ -255,6 +274,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], ExitCode]] = {
     "verify": _verify,
     "report": _report,
     "ensemble": _ensemble,
+    "panel": _panel,
 }
 
 

@@ -39,6 +39,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_verify(commands)
     _add_report(commands)
     _add_ensemble(commands)
+    _add_panel(commands)
     return parser
 
 
@@ -202,6 +203,25 @@ def _add_ensemble(commands: Commands) -> None:
         metavar="ADDRESS",
         help="a running Dask scheduler, such as tcp://node1:8786; its workers need circuittex and must share DIR",
     )
+
+
+def _add_panel(commands: Commands) -> None:
+    parser = _command(
+        commands,
+        "panel",
+        "solve a panel of many cells with electrodes, cuts, seams and strain",
+        "Solves the panel that PANEL describes: voltages, currents and heat, the resistance between each two\n"
+        "electrodes, and its gradient with respect to the strain and the Rc of every cell for the pairs that PANEL\n"
+        "names. Leaves in DIR: panel.json, panel.npz with the maps, pictures, the whole network as panel.lib with\n"
+        "the electrodes as pins and as the deck panel.cir, and its exact reduction to the electrodes as\n"
+        "panel_ports.lib. Large panels need the extra 'circuittex[panel]'.",
+        "circuittex panel examples/heater_panel.toml --out results/heater_panel",
+    )
+    parser.add_argument("panel", metavar="PANEL", type=Path, help="panel file (TOML); see docs/panel.md")
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, help="folder of the results (default: results/NAME of PANEL)"
+    )
+    parser.add_argument("--quiet", action="store_true", help="print no table")
 
 
 def _add_design(parser: argparse.ArgumentParser) -> None:

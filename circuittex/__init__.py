@@ -30,6 +30,13 @@ _HOMES = {
     "study.run": ("run_study",),
     "study.ensemble": ("run_ensemble",),
     "study.library.export": ("export_library",),
+    "study.panel.statement": ("Cut", "Electrode", "Panel", "Seam"),
+    "study.panel.cells": ("CellResistances", "cells_of_study"),
+    "study.panel.reader": ("load_panel",),
+    "study.panel.solution": ("solve_panel",),
+    "study.panel.gradient": ("panel_gradient",),
+    "study.panel.circuit": ("panel_circuit", "panel_netlists"),
+    "study.panel.pictures": ("gradient_figure", "panel_figure"),
     "results.plot": ("cell_figure", "probe_figure", "section_figure"),
     "results.records": ("Record", "Study"),
     "results.store": ("load_study",),
@@ -96,6 +103,19 @@ if TYPE_CHECKING:
     from circuittex.results.store import load_study as load_study
     from circuittex.study.ensemble import run_ensemble as run_ensemble
     from circuittex.study.library.export import export_library as export_library
+    from circuittex.study.panel.cells import CellResistances as CellResistances
+    from circuittex.study.panel.cells import cells_of_study as cells_of_study
+    from circuittex.study.panel.circuit import panel_circuit as panel_circuit
+    from circuittex.study.panel.circuit import panel_netlists as panel_netlists
+    from circuittex.study.panel.gradient import panel_gradient as panel_gradient
+    from circuittex.study.panel.pictures import gradient_figure as gradient_figure
+    from circuittex.study.panel.pictures import panel_figure as panel_figure
+    from circuittex.study.panel.reader import load_panel as load_panel
+    from circuittex.study.panel.solution import solve_panel as solve_panel
+    from circuittex.study.panel.statement import Cut as Cut
+    from circuittex.study.panel.statement import Electrode as Electrode
+    from circuittex.study.panel.statement import Panel as Panel
+    from circuittex.study.panel.statement import Seam as Seam
     from circuittex.study.run import run_study as run_study
 else:
 

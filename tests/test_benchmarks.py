@@ -30,6 +30,7 @@ SCRIPTS = [
     "netlist",
     "network",
     "newton",
+    "panel",
     "paper_tables",
     "scaling",
     "table",
@@ -96,6 +97,16 @@ def test_assembly_agrees_with_the_form() -> None:
     assert len(row) == len(assembly.HEAD)
     assert row[:2] == [1, 60]
     assert row[-1] < ROUND_OFF
+
+
+def test_every_method_solves_the_same_panel(monkeypatch: pytest.MonkeyPatch) -> None:
+    panel = script("panel")
+    results = [panel.case(8, electrodes, 3.0, "SuperLU") for electrodes in (2, 8)]
+    assert all(result["residual"] < 1e-10 for result in results)
+    assert results[0]["resistors"] == 8 * 9 + 8 * 7 + 8 * 8 - 6 - 3  # the cut crosses six warp and three weft yarns
+    monkeypatch.setattr(panel, "METHODS", ("SuperLU",))
+    (row,) = panel.rows(8, 2, 3.0, 1000)
+    assert len(row) == len(panel.HEAD)
 
 
 def test_both_factorisations_solve_the_same_panel() -> None:

@@ -27,7 +27,7 @@ from circuittex.results.records import Study
 from circuittex.results.store import load_study, write_study_start
 from circuittex.results.verification import Verification
 
-COMMANDS = ["new", "run", "netlist", "verify", "report"]
+COMMANDS = ["new", "run", "netlist", "verify", "report", "panel"]
 
 
 @pytest.fixture

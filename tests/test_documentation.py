@@ -98,6 +98,7 @@ def folder(small: str, computed: Path, tmp_path: Path, monkeypatch: pytest.Monke
     (tmp_path / "examples").mkdir()
     for name in ("weave", "examples/plain_weave", "examples/paper", "examples/paper_table"):
         (tmp_path / f"{name}.toml").write_text(small, encoding="utf-8")
+    shutil.copy(ROOT / "examples" / "heater_panel.toml", tmp_path / "examples")
     for name in ("weave", "plain_weave"):
         shutil.copytree(computed, tmp_path / "results" / name)
     shutil.copytree(computed, tmp_path / "results" / "packings-ensemble" / "members" / "0000")
@@ -189,7 +190,9 @@ def test_python(page: str, text: str, folder: Path) -> None:
     assert done.returncode == 0, f"{page}: {done.stderr}"
 
 
-PARTS = [(page, text) for page, text in shown("toml") if page != "choosing.md"]  # whole designs: test_choosing.py
+PANELS = [inner for name, inner in shown("toml") if name == "panel.md"]
+# Whole designs are run by test_choosing.py, whole panels below.
+PARTS = [(page, text) for page, text in shown("toml") if page not in ("choosing.md", "panel.md")]
 
 
 @pytest.mark.parametrize(("page", "text"), PARTS)
@@ -198,6 +201,24 @@ def test_part_of_a_design(page: str, text: str, small: str, tmp_path: Path) -> N
     design = load_design(tmp_path / "part.toml")
     assert page == "ensemble.md"
     assert design.packing.lateral == pytest.approx(0.0075), "7.5 um in mm"
+
+
+@pytest.mark.parametrize("text", PANELS)
+def test_panel_file(text: str, computed: Path, tmp_path: Path) -> None:
+    """As it stands; and with the table [results] that the page shows in place of [resistance], on a real study."""
+    file = tmp_path / "panel.toml"
+    file.write_text(text, encoding="utf-8")
+    assert main(["panel", str(file), "--out", str(tmp_path / "out"), "--quiet"]) == ExitCode.DONE
+    panel = (ROOT / "docs" / "panel.md").read_text(encoding="utf-8")
+    for row in re.findall(r"^\| (`\w+\.\w+`.*?) \|", panel, re.MULTILINE):
+        for name in re.findall(r"`([^`]+)`", row):
+            assert (tmp_path / "out" / name.replace("A_B", "left_pad")).is_file(), name
+    (results,) = re.findall(r"^\[results\]\n(?:\w.*\n)+", panel, re.MULTILINE)
+    results = results.replace("results/plain_weave", computed.name)
+    shutil.copytree(computed, tmp_path / computed.name, dirs_exist_ok=True)
+    file.write_text(re.sub(r"\[resistance\](?:.*\n)+?\n", f"{results}\n", text), encoding="utf-8")
+    assert "[results]" in file.read_text("utf-8")
+    assert main(["panel", str(file), "--out", str(tmp_path / "out"), "--quiet"]) == ExitCode.DONE
 
 
 def test_options_that_are_mentioned_exist() -> None:

@@ -60,6 +60,9 @@ ALLOWED: dict[str, set[str]] = {
         *{"design", "study", "results", "results.store", "electrical.network", "netlist"},
         *{"results.plot.style", "results.report.number", "results.report.page", "results.report.template"},
     },
+    "study.panel": {
+        *{"design", "solvers", "electrical.network", "netlist", "results", "results.store", "results.plot.style"},
+    },
 }
 ANYTHING = {"command", "__main__"}  # the command line, which nobody imports
 
@@ -75,7 +78,8 @@ LIBRARIES: dict[str, set[str]] = {
     "jinja2": {"results.report"},
     "filelock": {"base"},
     "meshio": {"results.vtk"},
-    "matplotlib": {"results.plot", "study.ensemble", "study.library"},
+    "matplotlib": {"results.plot", "study.ensemble", "study.library", "study.panel"},
+    "pyamg": {"solvers"},
     "distributed": {"study.ensemble"},
     "dask": {"study.ensemble"},
 }
@@ -203,6 +207,7 @@ HEAVY = [
     "pypardiso",
     "dask",
     "jinja2",
+    "pyamg",
 ]
 
 

@@ -94,7 +94,9 @@ def test_killed_between_any_two_changes_of_the_disk(
 
 
 RUN = """
+import signal
 import sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # jobs in the background of a shell ignore it
 sys.path.insert(0, sys.argv[1])
 import time
 import circuittex.study.folder

@@ -1,4 +1,4 @@
-"""The command line: new, run, netlist, verify, report, ensemble, export."""
+"""The command line: new, run, netlist, verify, report, ensemble, export, panel."""
 
 from __future__ import annotations
 
@@ -270,6 +270,25 @@ def _export(options: argparse.Namespace) -> ExitCode:
     return ExitCode.DONE
 
 
+def _panel(options: argparse.Namespace) -> ExitCode:
+    from circuittex.study.panel.gradient import panel_gradient
+    from circuittex.study.panel.output import table, write_panel
+    from circuittex.study.panel.reader import load_panel
+    from circuittex.study.panel.solution import solve_panel
+
+    panel, pairs = load_panel(options.panel)
+    folder = options.out or Path("results", options.panel.stem)
+    _prepare(folder)
+    solution = solve_panel(panel)
+    notes = write_panel(folder, solution, tuple(panel_gradient(solution, *pair) for pair in pairs))
+    if not options.quiet:
+        print(table(solution))
+        print(f"\nresults: {folder}")
+    for note in notes:
+        print(f"circuittex: note: {note}", file=sys.stderr)
+    return ExitCode.DONE
+
+
 COMMANDS: dict[str, Callable[[argparse.Namespace], ExitCode]] = {
     "new": _new,
     "run": _run,
@@ -278,6 +297,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], ExitCode]] = {
     "report": _report,
     "ensemble": _ensemble,
     "export": _export,
+    "panel": _panel,
 }
 
 

@@ -40,6 +40,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_report(commands)
     _add_ensemble(commands)
     _add_export(commands)
+    _add_panel(commands)
     return parser
 
 
@@ -238,6 +239,25 @@ def _add_export(commands: Commands) -> None:
     parser.add_argument(
         "--rise", metavar="K", type=float, default=10.0, help="temperature rise of the rated currents (default: 10 K)"
     )
+
+
+def _add_panel(commands: Commands) -> None:
+    parser = _command(
+        commands,
+        "panel",
+        "solve a panel of many cells with electrodes, cuts, seams and strain",
+        "Solves the panel that PANEL describes: voltages, currents and heat, the resistance between each two\n"
+        "electrodes, and its gradient with respect to the strain and the Rc of every cell for the pairs that PANEL\n"
+        "names. Leaves in DIR: panel.json, panel.npz with the maps, pictures, the whole network as panel.lib with\n"
+        "the electrodes as pins and as the deck panel.cir, and its exact reduction to the electrodes as\n"
+        "panel_ports.lib. Large panels need the extra 'circuittex[panel]'.",
+        "circuittex panel examples/heater_panel.toml --out results/heater_panel",
+    )
+    parser.add_argument("panel", metavar="PANEL", type=Path, help="panel file (TOML); see docs/panel.md")
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, help="folder of the results (default: results/NAME of PANEL)"
+    )
+    parser.add_argument("--quiet", action="store_true", help="print no table")
 
 
 def _add_design(parser: argparse.ArgumentParser) -> None:

@@ -26,22 +26,30 @@ def load_design(path: str | PathLike[str]) -> Design:
 
     Raises `DesignError` for a file that cannot be read, is not TOML, or states something impossible.
     """
+    return parse_design(read_toml(path, "design file"))
+
+
+def read_toml(path: str | PathLike[str], what: str) -> Mapping[str, object]:
+    """The tables of a TOML file; errors call it `what`.
+
+    Raises `DesignError` for a file that cannot be read or is not TOML.
+    """
     where = str(path)
     try:
         with Path(path).open("rb") as file:
             data = file.read(_LARGEST_FILE + 1)
         text = data.decode("utf-8-sig")
     except FileNotFoundError:
-        raise refuse("design file", where, "there is no such file") from None
+        raise refuse(what, where, "there is no such file") from None
     except IsADirectoryError:
-        raise refuse("design file", where, "it must be a TOML file, this is a directory") from None
+        raise refuse(what, where, "it must be a TOML file, this is a directory") from None
     except UnicodeDecodeError as error:
-        raise refuse("design file", where, f"it must be text in UTF-8; byte {error.start} is not") from None
+        raise refuse(what, where, f"it must be text in UTF-8; byte {error.start} is not") from None
     except (OSError, ValueError) as error:
-        raise refuse("design file", where, f"it cannot be read: {getattr(error, 'strerror', None) or error}") from None
+        raise refuse(what, where, f"it cannot be read: {getattr(error, 'strerror', None) or error}") from None
     if len(data) > _LARGEST_FILE:
-        raise refuse("design file", where, f"a design file has at most {_LARGEST_FILE} bytes")
-    return parse_design(_toml(text))
+        raise refuse(what, where, f"a {what} has at most {_LARGEST_FILE} bytes")
+    return _toml(text, what)
 
 
 def parse_design(mapping: Mapping[str, object]) -> Design:
@@ -66,15 +74,15 @@ def starter() -> str:
     return text
 
 
-def _toml(text: str) -> Mapping[str, object]:
+def _toml(text: str, what: str) -> Mapping[str, object]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise _syntax_error(text, str(error)) from None
     except RecursionError:
-        raise refuse("design file", "TOML", "it is nested too deeply") from None
+        raise refuse(what, "TOML", "it is nested too deeply") from None
     except ValueError as error:  # a whole number of thousands of digits, for example
-        raise refuse("design file", "TOML", f"it cannot be read: {error}") from None
+        raise refuse(what, "TOML", f"it cannot be read: {error}") from None
 
 
 def _syntax_error(text: str, message: str) -> DesignError:

@@ -107,9 +107,11 @@ class Numerics:
     '1e-06 N' as it is. Of moments on directors half a pitch is the lever."""
     max_iterations: int = field(
         default=200,
-        metadata=count("Newton iterations before a relaxation is given up or its step halved", 1, 100_000, shown="200"),
+        metadata=count(
+            "Newton iterations of a descent before it is given up or its step halved", 1, 100_000, shown="200"
+        ),
     )
-    """Newton iterations before a relaxation is given up; an increment of a loading path is then made in halves."""
+    """Newton iterations of a descent before it is given up; an increment of a loading path is then made in halves."""
     overlap_warning: float = field(
         default=0.3,
         metadata=number(

@@ -17,6 +17,7 @@ from circuittex.electrical.spice.ngspice import run_decks
 from circuittex.results.records import Study
 from circuittex.study.export import simplified
 from circuittex.study.library.export import export_library
+from circuittex.study.plan import plan
 
 STUDY = study()
 EXACT = 1e-9
@@ -173,6 +174,27 @@ def test_thinned_ports_keep_their_bound(library: Path) -> None:
     assert few < many
     assert (thin / exact - 1.0).max() <= THIN * (1 + 1e-9)
     assert (thin / exact - 1.0).min() > -1e-9, "taking conductors away lowers no resistance (Rayleigh)"
+
+
+def test_the_way_back_is_a_part_of_its_own(tmp_path: Path) -> None:
+    """At the strain that is passed twice each part has the resistances of its own state."""
+    design = STUDY.design
+    there = design.loading[0]
+    strains = (*there.strains[:2], there.strains[0])
+    loading = replace(there, strains=strains, gradients=(*there.gradients[:2], there.gradients[0]))
+    design = replace(design, loading=(loading,))
+    records = [
+        replace(record, name=step.name, strain=step.strain, loading=step.loading)
+        for step, record in zip(plan(design), STUDY.records, strict=False)
+    ]
+    export_library(replace(STUDY, design=design, records=tuple(records)), tmp_path, dialects=("ngspice",))
+    assert not (tmp_path / "ngspice" / "fabric_ports_stretch_s.lib").exists()
+    for way, state in (("load", 1), ("unload", 3)):
+        decks = ohmmeter(tmp_path / "ngspice", f"fabric_ports_stretch_{way}_s", PAIRS, f"strain={strains[0]}")
+        exact = wanted(state)
+        np.testing.assert_allclose(answers(decks), [exact[place(pair)] for pair in PAIRS], rtol=SAMPLED)
+    below = ohmmeter(tmp_path / "ngspice", "fabric_ports_stretch_unload_s", PAIRS[:1], "strain=0")
+    assert answers(below, "out_of_range")[0] == 1.0, "the way back ends at a strain of 2.5 %"
 
 
 # Corners of an ensemble

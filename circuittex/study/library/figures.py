@@ -94,6 +94,8 @@ def _network(known: Facts) -> Figure:
                 values = known.levels.units[path.records, column]
                 axes.plot(100 * path.strain, values, line, color=COLOURS[number % len(COLOURS)], marker="o", label=what)
         axes.set(xlabel="strain (%)", ylabel=label)
-        axes.set_ylim(bottom=0.0)  # from zero, or changes in the seventh digit would fill the picture
+        # From zero, or changes in the seventh digit would fill the picture.
+        top = float(axes.dataLim.y1)
+        axes.set_ylim(0.0, 1.1 * top if 0.0 < top < np.inf else 1.0)
         axes.legend()
     return figure

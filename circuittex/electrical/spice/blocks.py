@@ -20,7 +20,7 @@ PASSED_OVER = frozenset(
 GROUND = "0"
 
 _TOKEN = re.compile(r"\{[^{}]*\}|'[^']*'|=|[^\s=(){}',\"]+")
-_ASSIGNED = re.compile(r"([a-z_][a-z0-9_]*)\s*=\s*")
+_ASSIGNED = re.compile(r"(?<![^\s,])([a-z_][a-z0-9_]*)\s*=\s*")
 
 
 @dataclass(frozen=True)

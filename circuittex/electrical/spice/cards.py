@@ -16,6 +16,7 @@ MOST_BYTES = 500_000_000
 """Bytes of all these files."""
 
 _COMMENT = re.compile(r";.*|(?:^|(?<=[\s,]))\$(?=\s|$).*")
+_DOLLAR = re.compile(r"(?:^|[\s,])\$")
 _INCLUDE = re.compile(r"""\.(?:include|inc|lib)\s+(?:"([^"]*)"|'([^']*)'|(\S+))\s*""", re.IGNORECASE)
 _INCLUDES = (".include", ".inc", ".lib")
 
@@ -131,6 +132,8 @@ def _joined(text: str, name: str, *, title: bool) -> Iterator[tuple[Card, str]]:
 
 def _card(name: str, number: int, raw: str) -> tuple[Card, str]:
     card = Card(name, number, raw.lower())
-    if not raw.isascii() or not all(letter.isprintable() or letter == "\t" for letter in raw):
+    if not raw.isascii() or not raw.replace("\t", " ").isprintable():
         raise card.refused("only printable ASCII may stand outside of comments")
+    if _DOLLAR.search(raw):
+        raise card.refused("a word that begins with '$' is a comment for some simulators and none for others")
     return card, raw.strip()

@@ -274,6 +274,7 @@ BASE = "t\nV1 a 0 1\nR9 a 0 1\n"
         ("R1 a 0 {1", "is not expected"),
         ("R1 a $b 1k", "is a comment for some simulators"),
         (".param p={1}q={2}", "cannot be read"),
+        ("R1 a 0\n; a comment\n+ 1k", "line 6: '\\+ 1k' cannot be read: between it and its card is a comment"),
         ("R1 a ground 1", "give it another name"),
         ("R1 a b\u00e4 1", "only printable ASCII"),
         (".param p={q} q={p}\nR1 a 0 {p}", "follows from itself"),

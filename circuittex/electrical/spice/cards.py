@@ -112,20 +112,26 @@ class _Files:
 
 def _joined(text: str, name: str, *, title: bool) -> Iterator[tuple[Card, str]]:
     """The cards of one text, each also as it was written, with its continuation lines."""
-    first, parts = 0, list[str]()
+    first, parts, commented = 0, list[str](), False
     for number, line in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1):
-        stripped = line.strip()
-        if (title and number == 1) or stripped.startswith("*"):
+        whole = line.strip()
+        if (title and number == 1) or whole.startswith("*"):
             continue
-        stripped = _COMMENT.sub("", stripped).strip()
-        if stripped.startswith("+"):
+        bare = _COMMENT.sub("", whole).strip()
+        if bare.startswith("+"):
             if not parts:
-                raise Card(name, number, stripped.lower()).refused("there is no card before it to go on with")
-            parts.append(stripped[1:])
-        elif stripped:
+                raise Card(name, number, bare.lower()).refused("there is no card before it to go on with")
+            if commented:  # ngspice takes such a line for an empty card, and its value for another
+                raise Card(name, number, bare.lower()).refused(
+                    "between it and its card is a comment that does not begin with '*'"
+                )
+            parts.append(bare[1:])
+        elif bare:
             if parts:
                 yield _card(name, first, " ".join(parts))
-            first, parts = number, [stripped]
+            first, parts, commented = number, [bare], False
+        else:
+            commented = commented or bool(whole)
     if parts:
         yield _card(name, first, " ".join(parts))
 

@@ -18,14 +18,17 @@ from circuittex.base.frozen import frozen
 from circuittex.base.version import __version__
 from circuittex.electrical.network.circuit import KINDS, Circuit, reached_part
 from circuittex.electrical.network.names import safe_name, unique_names
+from circuittex.electrical.spice.foreign import Deck, read_deck
 from circuittex.electrical.spice.pyspice import to_pyspice, to_pyspice_subcircuit
 from circuittex.electrical.spice.reader import parse
 
 __all__ = [
+    "Deck",
     "Header",
     "deck",
     "parse",
     "pin_names",
+    "read_deck",
     "subcircuit",
     "to_pyspice",
     "to_pyspice_subcircuit",

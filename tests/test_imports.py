@@ -40,7 +40,12 @@ ALLOWED: dict[str, set[str]] = {
     "electrical.fields": {*STATE, "design"},
     "electrical.network": {*STATE, "design"},
     "electrical.spice": {"electrical.network"},
-    "netlist": {"electrical.network", "electrical.spice.reader", "electrical.spice.pyspice"},
+    "netlist": {
+        "electrical.network",
+        "electrical.spice.foreign",
+        "electrical.spice.reader",
+        "electrical.spice.pyspice",
+    },
     "fit": {"electrical.network", "design"},
     "results": RESULT_TYPES,
     "results.store": {*RESULT_TYPES, "results"},

@@ -23,6 +23,7 @@ from circuittex.study.library.facts import Facts, facts_of
 from circuittex.study.library.levels import CRIMPED, ENDS, FREE, detailed
 from circuittex.study.library.parts import Part, fixed_parts, strained_parts, thin_part
 from circuittex.study.library.subcircuit import library_text
+from circuittex.study.library.symbols.files import write_symbols
 from circuittex.study.plan import plan
 
 FORMAT = 1
@@ -40,7 +41,7 @@ def export_library(
     dialects: Sequence[str] = DIALECTS,
     rise: float = 10.0,
 ) -> tuple[Cell, ...]:
-    """Write the sub-circuits of a study into `folder`, with library.json, examples and datasheet.html.
+    """Write the sub-circuits of a study into `folder`, with symbols, library.json, examples and datasheet.html.
 
     Names of sub-circuits begin with `name` and are the same for every study and state. Cells in which strain is no
     input are of `state`, the first recorded one unless named. `ends`: see `ENDS`. With `thin` > 0 there are also ports
@@ -63,6 +64,7 @@ def export_library(
     ranges = {part.name: (float(part.network.strain[0]), float(part.network.strain[-1])) for part in found}
     _write_examples(folder / "examples", cells, ranges)
     _write_probes(folder / "examples", study, chosen)
+    write_symbols(folder, word, study.design.name, cells, ranges)
     write_datasheet(folder, study, known, cells)
     library = {
         "format": FORMAT,

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,10 +15,9 @@ from kicad_netlist import card, fields, netlist, pins
 from kiutils.schematic import Schematic
 from kiutils.symbol import SymbolLib
 from kiutils.utils.sexpr import parse_sexp
-from library_cases import pins_of, study
+from library_cases import CELLS, answer, direct, listed, pins_of, study
 from spicelib.editor.asy_reader import AsyReader
 
-from circuittex.base.arrays import Floats
 from circuittex.electrical.spice.ngspice import run_deck
 from circuittex.study.library.cell import Cell, Pin
 from circuittex.study.library.export import export_library
@@ -32,7 +29,6 @@ from circuittex.study.library.symbols.project import example_project
 
 SAME = 1e-9
 """Relative: the same numbers through the same program, and a raw file's digits."""
-CELLS = ("detailed", "ports", "cell", "unit", "ports_stretch_s", "ports_stretch_v", "unit_shear_v")
 NAME = 'the "weave" (a) \\'
 
 
@@ -50,11 +46,6 @@ def symbols(library: Path) -> dict[str, object]:
     read = SymbolLib.from_file(str(library / "kicad" / "fabric.kicad_sym"))
     assert int(read.version) == 20220914
     return {each.entryName: each for each in read.symbols}
-
-
-def listed(library: Path, dialect: str) -> list[dict[str, object]]:
-    cells = json.loads((library / "library.json").read_text("ascii"))["cells"]
-    return [cell for cell in cells if cell["dialect"] == dialect]
 
 
 def test_kiutils_reads_a_symbol_of_each_cell(library: Path, symbols: dict[str, object]) -> None:
@@ -122,24 +113,6 @@ def test_spicelib_reads_a_symbol_of_each_file_for_ltspice(library: Path) -> None
         on_edge = [line for line in read.lines if {(line.V1.X, line.V1.Y), (line.V2.X, line.V2.Y)} & places]
         assert len(on_edge) == len(places)
         assert all(not (x0 < x < x1 and y0 < y < y1) for x, y in places)
-
-
-def deck(library: Path, name: str, line: str) -> str:
-    """1 V at the first pin, and a load of its own at each of the others: no two pins are alike."""
-    names = pins_of((library / "ngspice" / f"{name}.lib").read_text("ascii"))
-    loads = [f"Rload{k} net_{pin} 0 {10 * 1.37**k!r}" for k, pin in enumerate(names)]
-    first = f"Vdrive net_{names[0]} 0 1"
-    return "\n".join([f"* {name}", f".include {library}/ngspice/{name}.lib", line, first, *loads, ".op", ".end", ""])
-
-
-def answer(library: Path, name: str, line: str) -> Floats:
-    names = pins_of((library / "ngspice" / f"{name}.lib").read_text("ascii"))
-    return run_deck(deck(library, name, line)).plots[-1].voltage([f"net_{pin}" for pin in names])[-1]
-
-
-def direct(library: Path, name: str) -> Floats:
-    names = pins_of((library / "ngspice" / f"{name}.lib").read_text("ascii"))
-    return answer(library, name, f"X1 {' '.join(f'net_{pin}' for pin in names)} {name}")
 
 
 @pytest.mark.parametrize("end", CELLS)
@@ -356,35 +329,3 @@ def test_no_two_pins_are_in_one_place(warp: int, weft: int, apart: int, letters:
     assert len({(place.x, place.y) for place in found.places}) == len(named)
     assert all(place.x in (-1, found.width + 1) or place.y in (-1, found.height + 1) for place in found.places)
     assert all(place.x < found.width for place in found.places if place.side == "bottom")
-
-
-PYSPICE = """
-import json, os, sys
-from ctypes.util import find_library
-os.environ.setdefault("NGSPICE_LIBRARY_PATH", find_library("ngspice"))
-from PySpice.Spice.Library import SpiceLibrary
-from PySpice.Spice.Netlist import Circuit
-folder, name, *pins = sys.argv[1:]
-found = SpiceLibrary(folder)
-circuit = Circuit("piece")
-circuit.include(found[name])
-circuit.X("1", name, *(f"net_{pin}" for pin in pins))
-circuit.V("drive", f"net_{pins[0]}", circuit.gnd, 1)
-for k, pin in enumerate(pins):
-    circuit.R(f"load{k}", f"net_{pin}", circuit.gnd, 10 * 1.37**k)
-analysis = circuit.simulator().operating_point()
-print(json.dumps([sorted(found.subcircuits), [float(analysis.nodes[f"net_{pin}"][0]) for pin in pins]]))
-"""
-
-
-@pytest.mark.parametrize("end", CELLS)
-def test_pyspice_finds_and_simulates_every_sub_circuit(library: Path, end: str) -> None:
-    name = f"fabric_{end}"
-    names = pins_of((library / "ngspice" / f"{name}.lib").read_text("ascii"))
-    # In a process of its own: the library allows one instance and keeps what it allocates.
-    command = [sys.executable, "-c", PYSPICE, str(library / "ngspice"), name, *names]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
-    assert done.returncode == 0, done.stderr
-    found, voltages = json.loads(done.stdout.splitlines()[-1])
-    assert found == sorted(cell["name"] for cell in listed(library, "ngspice"))
-    np.testing.assert_allclose(voltages, direct(library, name), rtol=1e-6, atol=1e-9)

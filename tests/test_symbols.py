@@ -198,6 +198,39 @@ def test_the_example_of_one_state_runs(tmp_path: Path) -> None:
     assert not (tmp_path / "ltspice").exists()
 
 
+def test_the_example_of_a_wide_fabric_joins_nothing_else(tmp_path: Path) -> None:
+    """One net for each pin that is open, however many there are: nothing of the fabric reaches the sources."""
+    yarns = [
+        Pin(f"warp{k}_{end}", side, "electrical") for k in range(70) for end, side in (("a", "left"), ("b", "right"))
+    ]
+    yarns += [
+        Pin(f"weft{k}_{end}", side, "electrical") for k in range(70) for end, side in (("a", "bottom"), ("b", "top"))
+    ]
+    wide = replace(cell("wide", "ngspice"), pins=(*yarns, *PINS[2:]))
+    folder = tmp_path / "kicad" / "example"
+    for path in (folder, tmp_path / "ngspice"):
+        path.mkdir(parents=True)
+    (tmp_path / wide.file).write_text(f".subckt piece {' '.join(pin.name for pin in wide.pins)}\n.ends piece\n")
+    text = example_project(wide, "D", "fabric.kicad_sym", 0.0, 0.1)["fabric_example.kicad_sch"]
+    (folder / "wide.kicad_sch").write_text(text, "utf-8")
+    (line,) = [line for line in netlist(Schematic.from_file(str(folder / "wide.kicad_sch")), folder) if line[0] == "X"]
+    nets = line.split()[1:-1]
+    assert nets[:2] == ["sense", "0"]
+    assert nets[-1] == "strain"
+    assert len({net for net in nets if net.startswith("nc_")}) == len(nets) - 3
+
+
+@pytest.mark.filterwarnings("ignore:no cell of Ry and Rc")
+def test_terminals_of_free_ends_have_pins(tmp_path: Path) -> None:
+    export_library(study(2), tmp_path, ends="free", dialects=("ngspice", "ltspice"))
+    for each in SymbolLib.from_file(str(tmp_path / "kicad" / "fabric_free.kicad_sym")).symbols:
+        name = each.entryName
+        nets = {pin.number: f"net_{pin.name}" for pin in pins(each)}
+        line = card("X1", fields(each), nets, tmp_path)
+        np.testing.assert_allclose(answer(tmp_path, name, line), direct(tmp_path, name), rtol=SAME, atol=1e-12)
+        assert len(AsyReader(tmp_path / "ltspice" / f"{name}.asy").pins) == len(nets)
+
+
 def test_ids_of_the_example_differ(library: Path) -> None:
     text = (library / "kicad" / "example" / "fabric_example.kicad_sch").read_text("utf-8")
     ids = re.findall(r"\(uuid ([0-9a-f-]{36})\)", text)

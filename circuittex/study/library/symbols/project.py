@@ -28,8 +28,8 @@ VERSION = 20230121
 LIBRARY = "../../"
 """The library's folder, seen from the project's."""
 SUPPLY, OHM = "3.3", "100"
-FABRIC, LEFT, TOP = (60, 40), 16, 30
-"""Where the fabric, and the sources and the resistor are, in units of the grid of the sheet."""
+LEFT, TOP = 16, 30
+"""Where the sources and the resistor are, in units of the grid of the sheet."""
 
 Point = tuple[float, float]
 
@@ -75,7 +75,7 @@ def example_project(cell: Cell, design: str, symbols: str, low: float, high: flo
 
 def _sheet(cell: Cell, design: str, nickname: str, low: float, high: float) -> Expression:
     strained = any(each.kind == "control" for each in cell.pins)
-    fabric = Item(f"{nickname}:{cell.name}", "X1", _grid(*FABRIC), fields_of(cell, design, LIBRARY), len(cell.pins))
+    fabric = Item(f"{nickname}:{cell.name}", "X1", _place(cell), fields_of(cell, design, LIBRARY), len(cell.pins))
     items = [
         fabric,
         _source("V1", _grid(LEFT, TOP), "DC", f"dc={SUPPLY}"),
@@ -118,7 +118,7 @@ def _marks(cell: Cell, strained: bool) -> Iterator[tuple[str, Point]]:
     nets = {electrical[0]: "sense", electrical[1]: "0"}
     for place in found.places:
         x, y = position(found, place.x, place.y)
-        at = _grid(*FABRIC)
+        at = _place(cell)
         net = nets.get(place.number, "" if place.pin.kind == "electrical" else place.pin.name)
         yield net, (round(at[0] + x, 4), round(at[1] - y, 4))
     yield "supply", _grid(LEFT + 3, TOP - 2)
@@ -127,6 +127,12 @@ def _marks(cell: Cell, strained: bool) -> Iterator[tuple[str, Point]]:
     if strained:
         yield "strain", _grid(LEFT, TOP + 10)
         yield "0", _grid(LEFT, TOP + 14)
+
+
+def _place(cell: Cell) -> Point:
+    """Of the fabric: on the right of all else, however wide it is."""
+    found = layout(cell)
+    return _grid(LEFT + 16 + found.width // 2, TOP + found.height // 2)
 
 
 def _mark(name: str, at: Point) -> Expression:

@@ -23,12 +23,13 @@ _HOMES = {
     "electrical.fields": ("solve_fields",),
     "electrical.network.circuit": ("Circuit", "build_circuit", "reduced_circuit", "to_networkx", "yarn_end_terminals"),
     "electrical.network.nodal": ("solve_nodal",),
-    "netlist": ("Header", "deck", "subcircuit", "to_pyspice", "to_pyspice_subcircuit"),
+    "netlist": ("Header", "deck", "read_deck", "subcircuit", "to_pyspice", "to_pyspice_subcircuit"),
     "fit": ("fit_network",),
     "relaxation.relax": ("move", "relax"),
     "relaxation.increment": ("advance",),
     "study.run": ("run_study",),
     "study.ensemble": ("run_ensemble",),
+    "study.kit": ("write_kit",),
     "study.library.export": ("export_library",),
     "study.panel.statement": ("Cut", "Electrode", "Panel", "Seam"),
     "study.panel.cells": ("CellResistances", "cells_of_study"),
@@ -89,6 +90,7 @@ if TYPE_CHECKING:
     from circuittex.mech.configuration import initial_configuration as initial_configuration
     from circuittex.netlist import Header as Header
     from circuittex.netlist import deck as deck
+    from circuittex.netlist import read_deck as read_deck
     from circuittex.netlist import subcircuit as subcircuit
     from circuittex.netlist import to_pyspice as to_pyspice
     from circuittex.netlist import to_pyspice_subcircuit as to_pyspice_subcircuit
@@ -102,6 +104,7 @@ if TYPE_CHECKING:
     from circuittex.results.records import Study as Study
     from circuittex.results.store import load_study as load_study
     from circuittex.study.ensemble import run_ensemble as run_ensemble
+    from circuittex.study.kit import write_kit as write_kit
     from circuittex.study.library.export import export_library as export_library
     from circuittex.study.panel.cells import CellResistances as CellResistances
     from circuittex.study.panel.cells import cells_of_study as cells_of_study

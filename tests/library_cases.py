@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -10,9 +11,12 @@ import numpy as np
 from synthetic_study import synthetic_study
 
 from circuittex.base.arrays import Floats
+from circuittex.electrical.spice.ngspice import run_deck
 from circuittex.results.records import Study
 from circuittex.study.plan import plan
 
+CELLS = ("detailed", "ports", "cell", "unit", "ports_stretch_s", "ports_stretch_v", "unit_shear_v")
+"""Ends of the names of one of each kind."""
 CARD = re.compile(r"^\.subckt (\S+) (.*)$", re.MULTILINE)
 
 
@@ -54,3 +58,29 @@ def ohmmeter(library: Path, name: str, pairs: list[tuple[str, str]], given: str 
         lines = [f"* {name}", f".include {library / name}.lib", f"X1 {nodes} {name} {given}", "I1 0 in 1", extra]
         decks.append("\n".join([line for line in lines if line] + [".op", ".end"]) + "\n")
     return decks
+
+
+def listed(library: Path, dialect: str) -> list[dict[str, object]]:
+    """What library.json says of the cells of a dialect."""
+    cells = json.loads((library / "library.json").read_text("ascii"))["cells"]
+    return [cell for cell in cells if cell["dialect"] == dialect]
+
+
+def loaded(library: Path, name: str, line: str) -> str:
+    """1 V at the first pin, and a load of its own at each of the others: no two pins are alike."""
+    names = pins_of((library / "ngspice" / f"{name}.lib").read_text("ascii"))
+    loads = [f"Rload{k} net_{pin} 0 {10 * 1.37**k!r}" for k, pin in enumerate(names)]
+    first = f"Vdrive net_{names[0]} 0 1"
+    return "\n".join([f"* {name}", f".include {library}/ngspice/{name}.lib", line, first, *loads, ".op", ".end", ""])
+
+
+def answer(library: Path, name: str, line: str) -> Floats:
+    """Voltages of the pins in that deck; `line` is the instance's card, whose nodes are called 'net_' and the pin."""
+    names = pins_of((library / "ngspice" / f"{name}.lib").read_text("ascii"))
+    return run_deck(loaded(library, name, line)).plots[-1].voltage([f"net_{pin}" for pin in names])[-1]
+
+
+def direct(library: Path, name: str) -> Floats:
+    """The same of a card in the order of the file."""
+    names = pins_of((library / "ngspice" / f"{name}.lib").read_text("ascii"))
+    return answer(library, name, f"X1 {' '.join(f'net_{pin}' for pin in names)} {name}")

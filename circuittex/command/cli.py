@@ -267,6 +267,11 @@ def _export(options: argparse.Namespace) -> ExitCode:
         members=complete_members(options.results) if several else (),
     )
     print(f"{len(cells)} sub-circuits in {options.out}: see {options.out / 'datasheet.html'}")
+    if options.kit:
+        from circuittex.study.kit import write_kit
+
+        kit = write_kit(study, options.out / "kit", options.state or None)
+        print(f"circuits with their answers in {kit}: see {kit / 'README.txt'}")
     return ExitCode.DONE
 
 

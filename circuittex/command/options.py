@@ -239,6 +239,11 @@ def _add_export(commands: Commands) -> None:
     parser.add_argument(
         "--rise", metavar="K", type=float, default=10.0, help="temperature rise of the rated currents (default: 10 K)"
     )
+    parser.add_argument(
+        "--kit",
+        action="store_true",
+        help="write also DIR/kit: circuits of three sizes with their answers, to check any other simulator by",
+    )
 
 
 def _add_panel(commands: Commands) -> None:

@@ -26,6 +26,7 @@ from circuittex.study.library.levels import CRIMPED, ENDS, FREE, detailed
 from circuittex.study.library.network import Network, floating
 from circuittex.study.library.parts import Part, fixed_parts, strained_parts
 from circuittex.study.library.subcircuit import library_text
+from circuittex.study.library.symbols.files import write_symbols
 from circuittex.study.plan import plan
 
 FORMAT = 1
@@ -44,7 +45,7 @@ def export_library(
     rise: float = 10.0,
     members: Iterable[Study] = (),
 ) -> tuple[Cell, ...]:
-    """Write the sub-circuits of a study into `folder`, with library.json, examples and datasheet.html.
+    """Write the sub-circuits of a study into `folder`, with symbols, library.json, examples and datasheet.html.
 
     Names of sub-circuits begin with `name` and are the same for every study and state. Cells in which strain is no
     input are of `state`, the first recorded one unless named. `ends`: see `ENDS`. With `thin` > 0 there are also ports
@@ -68,6 +69,8 @@ def export_library(
     networks = {part.name: part.network for part in found}
     _write_examples(folder / "examples", cells, networks)
     _write_probes(folder / "examples", study, chosen)
+    ranges = {each: (float(network.strain[0]), float(network.strain[-1])) for each, network in networks.items()}
+    write_symbols(folder, word, study.design.name, cells, ranges)
     write_datasheet(folder, study, known, cells, networks)
     library = {
         "format": FORMAT,

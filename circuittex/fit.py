@@ -181,6 +181,8 @@ def fit_network(
 
 def _poor(worst: float, residual: float, shared: bool) -> tuple[str, ...]:
     """What to say of a network that does not describe its cell; `shared`: its crossings have one resistance."""
+    if worst == np.inf:
+        return ("the reduced network does not join yarn ends that the cell joins",)
     if worst > POOR:
         way_out = '; with electrical.fit = "all-pairs" each crossing has a resistance of its own' if shared else ""
         return (f"the reduced network is off by up to {100 * worst:.2g} % between two yarn ends{way_out}",)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from circuittex.base.frozen import same
 from circuittex.base.workers import completed
 from circuittex.command.cli import main
 from circuittex.contact.extract import contacts_of
-from circuittex.design import Design, starter, uniaxial
+from circuittex.design import Design, parse_design, starter, uniaxial
 from circuittex.electrical.fields import solve_probes
 from circuittex.fit import fit_network
 from circuittex.geometry.mesh import FibrilMesh
@@ -152,12 +153,19 @@ def test_it_says_what_it_does(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> No
     assert said == [f"relaxed: error estimate, {words}" for words in module.VARIANTS]
 
 
+def test_the_starter_leaves_room() -> None:
+    """What `circuittex new` writes has "auto" for both: a README that says run it with --error-estimate must hold."""
+    design = parse_design(tomllib.loads(starter()))
+    points = design.resolution.contact_points
+    assert [each.numerics.contact_points for each in variants(design)][2] == 2 * points
+
+
 @pytest.mark.parametrize(
     ("numerics", "parts"),
     [
         ({"elements": 9}, ["numerics.elements: 9", "must be even"]),
         ({"elements": 2}, ["numerics.elements: 2", "with 1 as well"]),
-        ({"contact_points": 11}, ["numerics.contact_points: 11", "with 22 as well", "20"]),
+        ({"contact_points": 21}, ["numerics.contact_points: 21", "with 42 as well", "40"]),
     ],
 )
 def test_numerics_without_room_are_refused(numerics: dict[str, int], parts: Sequence[str]) -> None:

@@ -78,7 +78,25 @@ def test_a_probe_across_yarns_without_current_beside_one_with_current_does_not_f
 def test_currents_that_no_crossing_resistance_explains_are_reported():
     # Across yarns more than along one: Rc goes to the edge of the search.
     fit = fit_network([1.0, 5.0, 5.0], DESIGN)
-    assert any("Rc is not determined, at the edge of the search" in warning for warning in fit.warnings)
+    assert any("at the edge of the search" in warning for warning in fit.warnings)
+    assert np.isnan([fit.Ry, fit.Rc]).all(), "Ry goes astray with it"
+
+
+def test_contacts_that_hardly_conduct_keep_the_resistance_of_the_yarns():
+    """Found in review: with Rc beyond the range of the search, Ry was six times too large and printed as known."""
+    Ry, Rc = 0.28, 1e12
+    fit = fit_network(network_conductances(DESIGN, Ry, Rc).sum(axis=1), DESIGN)
+    assert fit.Ry == pytest.approx(Ry, rel=1e-9)
+    assert fit.Rc == pytest.approx(Rc, rel=1e-6)
+
+
+def test_without_a_probe_across_yarns_nothing_is_said_of_crossings():
+    along = replace(DESIGN, probes=DESIGN.probes[:1])
+    fit = fit_network([0.8836], along)
+    assert fit.Ry == pytest.approx(0.2829, abs=1e-4)
+    assert np.isnan(fit.Rc)
+    assert not fit.known
+    assert fit.warnings == ("Rc is not determined: there is no probe between different yarns",)
 
 
 def test_derivatives_are_those_of_differences():

@@ -240,6 +240,15 @@ def test_vanishing_contacts_are_dropped_and_counted() -> None:
     assert (nothing.n_contacts, all_of_them) == (0, 4)
 
 
+def test_the_only_way_between_two_yarns_is_never_dropped() -> None:
+    """Found in review: a millionth of a yarn's own contacts was all that joined it to others, and went."""
+    mesh = fibrils([8.0] * 3, yarn=[0, 0, 1])
+    state = touching(mesh, [0, 0, 0], [1, 2, 3], [1, 2, 2], [1, 2, 3], conductance=[1.0, 1e-9, 1e-16])
+    kept, dropped = drop_vanishing(state, 1e-6)
+    assert dropped == 1
+    assert_array_equal(kept.conductance, [1.0, 1e-9])
+
+
 def test_simplify_composes_and_counts() -> None:
     state = random_state(11)
     found = simplify(state, merge_length=0.5, snap_length=1e-2, drop_fraction=0.2)

@@ -281,3 +281,10 @@ def test_a_resistance_that_is_none_is_refused_by_name(ohm):
     resistance[1] = ohm
     with pytest.raises(CircuitError, match=f"resistor '{good.resistor_names[1]}': {ohm!r} ohm is not usable"):
         solve_nodal(replace(good, resistance=resistance), {"warp1_minus": 1.0, "weft1_plus": 0.0})
+
+
+def test_resistances_too_far_apart_are_said_to_be() -> None:
+    """Nothing of 1e30 ohm is left beside 1 ohm: SciPy's own words for the pivot of zero are no answer."""
+    edges = [(0, 2, 1e30), (2, 3, 1.0), (3, 1, 1e30)]
+    with pytest.raises(CircuitError, match="too far apart for a nodal solution"):
+        solve_nodal(network(edges, [0, 1]), {"p0": 1.0, "p1": 0.0})

@@ -16,12 +16,14 @@ import pytest
 from circuittex.contact.extract import contacts_of
 from circuittex.design import Design, Material, Packing, Yarn, plain_weave
 from circuittex.electrical.fields import solve_probes
-from circuittex.electrical.network.circuit import build_circuits
+from circuittex.electrical.network.circuit import build_circuit, build_circuits
 from circuittex.electrical.network.nodal import solve_nodal
+from circuittex.electrical.network.ports import port_matrix
 from circuittex.fit import fit_network
 from circuittex.geometry.weave import build_mesh
 from circuittex.relaxation.increment import advance
 from circuittex.relaxation.relax import Equilibrium, relax
+from circuittex.study.circuits import conducting_ends
 from circuittex.study.export import simplified
 
 RANGE = range(-12, 11)
@@ -133,8 +135,10 @@ def electrics(design: Design, found: Equilibrium, scale: Scale) -> dict[str, obj
     s, m, _, c, h = (2.0**exponent for exponent in scale)
     contacts = contacts_of(design, build_mesh(design), found.configuration)
     fields = solve_probes(contacts, design.terminals, design.probes)
-    fit = fit_network([each.currents[0] for each in fields], design)
     probe, simple = design.probes[1], simplified(design, contacts).contacts
+    ports = port_matrix(build_circuit(simple, conducting_ends(contacts.mesh)))
+    fit = fit_network([each.currents[0] for each in fields], design, ports)
+    assert np.isfinite(fit.kind_resistance).all()
     circuit = build_circuits(simple, [[t for t in design.terminals if t.name in (probe.source, probe.sink)]])[0]
     nodal = solve_nodal(circuit, {probe.source: probe.voltage, probe.sink: 0.0})
     siemens = c * s
@@ -154,6 +158,7 @@ def electrics(design: Design, found: Equilibrium, scale: Scale) -> dict[str, obj
         "port current": nodal.port_current / siemens,
         "Ry": fit.Ry * siemens,
         "Rc": fit.Rc * siemens,
+        "by kind": (fit.kind_resistance * siemens, fit.pair_resistance * siemens, fit.crossings * siemens),
         "fit": (fit.covariance * siemens**2, fit.residual, fit.currents / siemens),
     }
 

@@ -178,3 +178,22 @@ def test_size_beyond_ngspice_is_said_plainly() -> None:
     found = verify(state, state, TERMINALS, PROBES, timeout=1e-3)
     assert not found.ngspice_checked
     assert "resistors" in found.note
+
+
+def test_a_check_that_rounding_drowns_is_none() -> None:
+    """Yarns on contacts of 1e-14 S float within the digits: nobody may say that ngspice confirmed that."""
+    state = woven(per_yarn=2, points=6, seed=1)
+    faint = replace(state, conductance=1e-13 * state.conductance)
+    found = verify(faint, simplified(faint), TERMINALS, PROBES)
+    assert not found.ngspice_checked
+    assert found.agrees
+    assert "too coarse" in found.note or "no route checks" in found.note
+
+
+def test_merging_that_changes_currents_is_noted() -> None:
+    state = woven(per_yarn=2, points=6, seed=1)
+    found = verify(
+        state, simplify(state, merge_length=8.0, snap_length=1e-3, drop_fraction=0.95).contacts, TERMINALS, PROBES
+    )
+    assert found.merge_error > module.MERGED
+    assert "merging contacts changes a probe current" in found.note

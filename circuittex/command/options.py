@@ -83,8 +83,8 @@ def _add_run(commands: Commands) -> None:
         "for ParaView. States are written one by one: however a run ends, the same command goes on from the\n"
         "states that are finished, with the same numbers. Loading paths are computed beside one another, as far\n"
         "as there are cores. Results of another design in DIR are refused, and so is a DIR that another run is\n"
-        "writing to. Exit code 5 where routes differ by more than 1e-9; without ngspice the run completes and\n"
-        "says that it did not check.",
+        "writing to. Exit code 5 where routes differ by more than 1e-9 and their rounding; without ngspice the\n"
+        "run completes and says that it did not check.",
         "circuittex run examples/plain_weave.toml --out results/plain_weave",
     )
     _add_design(parser)
@@ -152,8 +152,8 @@ def _add_verify(commands: Commands) -> None:
         "verify",
         "check computed states again: finite elements, nodal solution, ngspice",
         "Solves every recorded state again by all three routes and prints the largest differences of node\n"
-        "voltages and terminal currents. Exit code 5 where routes differ by more than 1e-9, 8 without\n"
-        "ngspice, 9 where ngspice failed. Changes nothing in the folder.",
+        "voltages and terminal currents. Exit code 5 where routes differ by more than 1e-9 and their rounding,\n"
+        "8 without ngspice, 9 where ngspice failed. Changes nothing in the folder.",
         "circuittex verify results/plain_weave --state relaxed",
     )
     _add_results(parser)

@@ -132,14 +132,21 @@ def snap_feet(state: ContactState, length: float) -> tuple[ContactState, int]:
 
 
 def drop_vanishing(state: ContactState, fraction: float) -> tuple[ContactState, int]:
-    """Leave out contacts that conduct nothing or less than `fraction` of the best one; returns also how many.
+    """Leave out contacts that conduct nothing or less than `fraction` of the best one between the same two yarns.
+
+    Returns also how many. Of a cell's best one a part would say nothing: where two kinds of yarn hardly conduct to one
+    another, all that joins them may be less than a millionth of what joins the fibrils within one.
+
 
     Raises DesignError unless 0 <= `fraction` < 1.
     """
     if not 0.0 <= fraction < 1.0:
         raise DesignError("drop_fraction", fraction, "must be at least 0 and less than 1")
-    largest = state.conductance.max(initial=0.0)
-    kept = np.flatnonzero((state.conductance > 0.0) & (state.conductance >= fraction * largest))
+    yarns = np.sort(state.mesh.yarn[np.stack([state.fibril_a, state.fibril_b])], axis=0)
+    pair = yarns[0] * len(state.mesh.yarn_names) + yarns[1]
+    largest = np.zeros(len(state.mesh.yarn_names) ** 2)
+    np.maximum.at(largest, pair, state.conductance)
+    kept = np.flatnonzero((state.conductance > 0.0) & (state.conductance >= fraction * largest[pair]))
     return _take(state, kept), state.n_contacts - len(kept)
 
 

@@ -86,7 +86,7 @@ class Numerics:
     order: int = field(default=2, metadata=count("of the elements, 1 or 2", 1, 2, shown="2"))
     """Polynomial order of the elements, 1 or 2."""
     contact_points: int | str = field(
-        default=4, metadata=count('of each element, 1 to 20; "auto"', 1, 20, shown=AUTO, words=(AUTO,))
+        default=4, metadata=count('of each element, 1 to 40; "auto"', 1, 40, shown=AUTO, words=(AUTO,))
     )
     """Contact points of each element, on either side, or 'auto' (`Design.resolution`)."""
     section_degree: int = field(

@@ -8,6 +8,10 @@ AGREEMENT = 1e-9
 """Routes on the same discretisation that differ by more than this (relative current, V per V) do not agree."""
 
 
+COARSEST = 1e-4
+"""Where rounding alone explains a larger difference, a route checks nothing, and is not said to have."""
+
+
 @frozen
 class Verification:
     """Largest differences between the routes over all probes of one contact state."""

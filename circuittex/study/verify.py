@@ -20,7 +20,7 @@ from circuittex.electrical.network.nodal import rounding_errors, solve_nodal
 from circuittex.electrical.spice.ngspice import run_decks
 from circuittex.geometry.refine import refined
 from circuittex.netlist import deck, pin_names
-from circuittex.results.verification import AGREEMENT, Verification
+from circuittex.results.verification import AGREEMENT, COARSEST, Verification
 from circuittex.study.circuits import probe_circuits
 
 NO_CURRENT = 1e-6
@@ -28,6 +28,9 @@ NO_CURRENT = 1e-6
 
 NOTHING = 1e-12
 """A probe with less than this fraction of an insulated yarn's current carries none: it is measured against that."""
+
+MERGED = 0.01
+"""A probe current that merging changes by more than this part is a note."""
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -78,7 +81,7 @@ def verify(
         full_fields, full_nodal = _native(clock, whole, probes, full)
         answers = _native(clock, small, probes, merged)
     except CircuitError as error:
-        return _unresolved(error, clock)
+        return _unresolved(f"nodal analysis says {error}", clock)
     routes = dict(zip(("fields", "nodal"), answers, strict=True))
     yarn = _yarn_currents(contacts, probes)
     native = _difference(full_fields, full_nodal, yarn), _difference(answers[0], answers[1], yarn)
@@ -86,14 +89,20 @@ def verify(
     try:
         routes["ngspice"] = clock("ngspice", _ngspice, small, probes, timeout)
         limit = _rounding(small, probes, routes["nodal"], yarn)
+        if limit > COARSEST:
+            raise NgspiceError(f"its own rounding, {limit:.1e}, is too coarse for resistances this far apart")
         with_ngspice = [_difference(answer, routes["ngspice"], yarn) for answer in answers]
     except NgspiceError as error:
         note = f"ngspice did not check this state: {error}"
-        failed = not isinstance(error, NgspiceUnavailableError)
+        failed = not isinstance(error, NgspiceUnavailableError) and limit <= COARSEST
+        routes.pop("ngspice", None)
+        limit = 0.0
     voltage, current = np.max([*native, *with_ngspice], axis=0)
     native_limit = 0.0
     if np.max(native) > AGREEMENT:
         native_limit = max(_rounding(c, probes, a, yarn) for c, a in ((whole, full_nodal), (small, routes["nodal"])))
+        if native_limit > COARSEST:
+            return _unresolved(f"rounding alone leaves {native_limit:.1e} of the potentials open", clock)
     found = Verification(
         routes=tuple(routes),
         max_voltage_difference=float(voltage),
@@ -113,11 +122,11 @@ def verify(
     return replace(found, note=_note(found))
 
 
-def _unresolved(error: CircuitError, clock: _Clock) -> Verification:
-    """What is left where nodal analysis finds resistances too far apart for its digits: nothing to compare with."""
+def _unresolved(reason: str, clock: _Clock) -> Verification:
+    """What is left where resistances are too far apart for the digits of nodal analysis: nothing to compare with."""
     nan = float("nan")
     seconds = clock.seconds["fields"], clock.seconds["nodal"], nan
-    note = f"no route checks this state: nodal analysis says {error}"
+    note = f"no route checks this state: {reason}"
     return Verification(("fields",), nan, nan, nan, 0.0, nan, nan, *seconds, False, note)
 
 
@@ -126,6 +135,11 @@ def _note(found: Verification) -> str:
     sentences = [found.note] if found.note else []
     if found.ngspice_limit > AGREEMENT:
         sentences.insert(0, f"ngspice's own rounding limits this check to {found.ngspice_limit:.1e}.")
+    if found.merge_error > MERGED:
+        sentences.append(
+            f"merging contacts changes a probe current by {100 * found.merge_error:.2g} %, and so netlists and the "
+            "network fitted to them: state a smaller numerics.merge_length or drop_fraction."
+        )
     if not found.agrees:
         differences = (
             f"{found.max_voltage_difference:.1e} V per V, currents {found.max_current_difference:.1e} relative"

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from circuittex.base.arrays import Floats, Ints
+from circuittex.base.binary import power_of_two
 from circuittex.base.frozen import frozen
 from circuittex.design import Design
 from circuittex.electrical.network.circuit import Circuit, reduced_circuit, yarn_end_name
@@ -117,7 +118,8 @@ def match_pairs(design: Design, grouping: Groups, matrix: PortMatrix) -> Match:
     i, j = np.triu_indices(len(wanted), 1)
     known = np.isfinite(wanted[i, j]) & (wanted[i, j] > 0.0)
     i, j = i[known], j[known]
-    target = np.log(wanted[i, j])
+    unit = _unit(grouping)
+    target = np.log(wanted[i, j] / unit)
     between = np.concatenate([[i], [j]])
 
     def model(circuit: Circuit, drop: Floats, conductance: Floats) -> tuple[Floats, Floats]:
@@ -130,7 +132,7 @@ def match_pairs(design: Design, grouping: Groups, matrix: PortMatrix) -> Match:
         share = conductance[:, None] * (response[:, between[0]] - response[:, between[1]]) ** 2 / ohm
         return np.log(ohm), share
 
-    return _matched(design, grouping, target, model, "the resistances between the pins")
+    return _matched(design, grouping, target, model, "the resistances between the pins", unit)
 
 
 def match_probes(design: Design, grouping: Groups, conductance: Floats) -> Match:
@@ -138,7 +140,8 @@ def match_probes(design: Design, grouping: Groups, conductance: Floats) -> Match
     ends = {t.name: [yarn_end_name(yarn, side) for yarn, side in t.ends] for t in design.terminals}
     carried = conductance > 0.0
     probes = [probe for probe, there in zip(design.probes, carried, strict=True) if there]
-    target = -np.log(conductance[carried])
+    unit = _unit(grouping)
+    target = -np.log(conductance[carried] * unit)
 
     def model(circuit: Circuit, drop: Floats, siemens: Floats) -> tuple[Floats, Floats]:
         logs, shares = [], []
@@ -150,7 +153,12 @@ def match_probes(design: Design, grouping: Groups, conductance: Floats) -> Match
             shares.append(power / max(power.sum(), np.finfo(float).tiny))
         return np.array(logs), np.array(shares).reshape(len(probes), len(siemens)).T
 
-    return _matched(design, grouping, target, model, "the probe currents")
+    return _matched(design, grouping, target, model, "the probe currents", unit)
+
+
+def _unit(grouping: Groups) -> float:
+    """Ohm in which the search counts: logarithms of pure numbers are rounded alike at every scale."""
+    return power_of_two(float(np.nanmax(grouping.start, initial=0.0)) or 1.0)
 
 
 def drops(circuit: Circuit) -> Floats:
@@ -194,7 +202,8 @@ Model = Callable[[Circuit, Floats, Floats], tuple[Floats, Floats]]
 """(network, drops, conductances) -> logarithms of what is compared (D,), shares (R, D) of the resistors in it."""
 
 
-def _matched(design: Design, grouping: Groups, target: Floats, model: Model, data: str) -> Match:
+def _matched(design: Design, grouping: Groups, target: Floats, model: Model, data: str, unit: float) -> Match:
+    """The values with which `model` comes closest to `target`, whose logarithms are of resistances in `unit` (ohm)."""
     count = len(grouping.start)
     if not len(target) or not count:
         reason = f"no value is determined: {data} say nothing" if count else "no yarn conducts: there is no network"
@@ -213,8 +222,9 @@ def _matched(design: Design, grouping: Groups, target: Floats, model: Model, dat
         found, shares = model(circuit, drops(circuit), 1.0 / circuit.resistance)
         return found - target, shares.T @ member
 
-    unknown, segment = ~np.isfinite(grouping.start), float(np.log(np.nanmean(grouping.start)))
-    logs = np.log(np.where(unknown, 1.0, grouping.start))
+    known = grouping.start / unit
+    unknown, segment = ~np.isfinite(known), float(np.log(np.nanmean(known)))
+    logs = np.log(np.where(unknown, 1.0, known))
     starts = [np.where(unknown, segment + step, logs) for step in np.log(RATIOS)]
     start = min(starts, key=lambda each: float(np.linalg.norm(both(each)[0])))
     middle = np.where(unknown, segment, logs)
@@ -234,7 +244,7 @@ def _matched(design: Design, grouping: Groups, target: Floats, model: Model, dat
     found = least_squares(misfits, start, jac=slopes, bounds=bounds, x_scale="jac", **limits)
     names = [*(f"Ry of {kind}" for kind in grouping.yarns), *(f"Rc of {pair}" for pair in grouping.crossings)]
     reasons, lost = _undetermined(found.jac, names, data)
-    return Match(np.exp(found.x), lost, float(np.expm1(np.abs(found.fun).max())), reasons)
+    return Match(unit * np.exp(found.x), lost, float(np.expm1(np.abs(found.fun).max())), reasons)
 
 
 def _segments(shape: tuple[int, int], yarn: int) -> int:

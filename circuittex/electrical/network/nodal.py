@@ -198,7 +198,13 @@ def _grounded(circuit: Circuit, ports: Sequence[str]) -> _Grounded:
     lu = None
     if len(inner):
         # Without pivoting, in the order of minimum degree, it is twice as fast but loses a twelfth digit.
-        lu = splu(((inwards * conductance) @ inwards.T).tocsc(), permc_spec="COLAMD")
+        try:
+            lu = splu(((inwards * conductance) @ inwards.T).tocsc(), permc_spec="COLAMD")
+        except RuntimeError as error:  # a pivot of zero: nothing of the weak resistors is left in the matrix
+            least, most = float(circuit.resistance.min()), float(circuit.resistance.max())
+            raise CircuitError(
+                f"singular: resistances between {least:.1e} and {most:.1e} ohm are too far apart for a nodal solution"
+            ) from error
     return _Grounded(fixed, inner, difference, inwards, conductance, lu)
 
 

@@ -19,7 +19,7 @@ from circuittex.electrical.network.nodal import solve_nodal
 # A conductance below this fraction of that of an insulated yarn is none: it is rounding of the solution.
 _NONE = 1e-12
 # Rc / Ry of the start values, one for each decade, and how far beyond them the search may go.
-_RATIOS = np.logspace(-8.0, 10.0, 19)
+_RATIOS = np.logspace(-8.0, 12.0, 21)
 _BEYOND = 10.0
 # A value is called undetermined where a relative error of the weighted currents comes back this many times larger.
 _AMPLIFIED = 100.0
@@ -166,13 +166,18 @@ def _without_contacts(insulated: Floats, wanted: Floats, scale: Floats, volts: F
     Ry = float(model @ model / (model @ target))
     misfit = model / Ry - target
     variance = _variance(misfit) * Ry**2 / float((model / Ry) @ (model / Ry))
+    asked = bool((insulated == 0.0).any())
     return OnePair(
         Ry=Ry,
-        Rc=float("inf"),
+        Rc=float("inf") if asked else float("nan"),
         residual=float(np.linalg.norm(misfit)),
         covariance=np.array([[variance, 0.0], [0.0, np.inf]]),
         weighting=weighting,
-        warnings=("Rc is not determined: no probe between different yarns carries current",),
+        warnings=(
+            "Rc is not determined: no probe between different yarns carries current"
+            if asked
+            else "Rc is not determined: there is no probe between different yarns",
+        ),
         currents=insulated / Ry * volts,
     )
 
@@ -217,12 +222,12 @@ def _with_contacts(design: Design, wanted: Floats, scale: Floats, volts: Floats,
     shares = network_conductances(design, Ry, Rc)
     spread, warnings = _spread(-shares / scale[:, None], float(np.abs(target).max()))
     if not low + 1.0 < logs[1] < high - 1.0:
-        warnings += ("Rc is not determined, at the edge of the search: no crossing resistance explains the currents",)
+        warnings += ("Ry and Rc are not determined, at the edge of the search: no Rc explains the currents",)
     if len(wanted) < 3:
         warnings += (f"{len(wanted)} probes leave no misfit to judge the fit by: the covariance is unknown",)
     lost = np.isinf(np.diag(spread)) | (np.sqrt(np.diag(spread)) * float(np.abs(target).max()) > _AMPLIFIED)
     if not low + 1.0 < logs[1] < high - 1.0:
-        lost[1] = True
+        lost[:] = True  # where one of them stands at an edge, the other has gone astray with it
     variance = _variance(misfit)
     covariance = (
         variance * spread * np.outer([Ry, Rc], [Ry, Rc]) if np.isfinite(variance) else np.diag([np.inf, np.inf])

@@ -27,10 +27,10 @@ _AIM = 1e-12
 _ITERATIONS = 500
 _ROUNDS = 6
 """Corrections at most; one is usual."""
-_FEW, _SMALL = 3, 50_000
+_FEW, _SMALL = 2, 100_000
 """Up to this many columns multigrid is faster from this many unknowns on (benchmarks/panel.py)."""
 LARGEST_DIRECT = 1_200_000
-"""Unknowns of a factorisation at most: it takes 3 GB and half a minute."""
+"""Unknowns of a factorisation at most: it takes 2 GB and some ten seconds."""
 _BLOCK = 8
 """Columns that are solved at once, for memory's sake."""
 _COARSE = 2000

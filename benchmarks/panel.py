@@ -5,7 +5,7 @@
 Panels of n x n crossings, Ry = 0.28 ohm, fed from their left to their right edge, with a slanting cut that sends the
 current through the crossings; and the same fed through 16 electrodes. Each case runs in a process of its own, which
 tells its peak memory. 'own' is circuittex's Cholesky, 'CHOLMOD' that of scikit-sparse where it is installed, 'SuperLU'
-SciPy's by minimum degree as panels use it, 'multigrid' pyamg's Ruge-Stuben as a preconditioner. Seconds are those of
+SciPy's by minimum degree as panels use it, 'multigrid' pyamg's as panels use it. Seconds are those of
 the processor, for assembly, factorisation or set-up, and all solutions, all with a relative residual below 1e-10;
 writing is that of the panel's sub-circuit as text.
 """

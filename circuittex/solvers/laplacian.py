@@ -27,13 +27,17 @@ _AIM = 1e-12
 _ITERATIONS = 500
 _ROUNDS = 6
 """Corrections at most; one is usual."""
-_FEW, _SMALL = 3, 50_000
+_FEW, _SMALL = 2, 100_000
 """Up to this many columns multigrid is faster from this many unknowns on (benchmarks/panel.py)."""
 LARGEST_DIRECT = 1_200_000
-"""Unknowns of a factorisation at most: it takes 3 GB and half a minute."""
+"""Unknowns of a factorisation at most: it takes 2 GB and some ten seconds."""
 _BLOCK = 8
 """Columns that are solved at once, for memory's sake."""
-_COARSE = 500
+_COARSE = 2000
+"""Unknowns of the coarsest level, which is factorised."""
+_DENSE = 20
+"""Entries of a row up to which levels are coarsened as Ruge and Stuben do, beyond by aggregation: chains that hang
+together weakly get ever denser levels, which took half an hour for a panel of 1e7 resistors and had not ended."""
 
 Ends = NDArray[np.int32]
 Solve = Callable[[Floats], Floats]
@@ -177,11 +181,23 @@ def _multigrid(matrix: sp.csr_array) -> Solve:
             f"multigrid for {matrix.shape[0]} unknowns needs the extra: pip install 'circuittex[panel]'; without it "
             f"there may be {LARGEST_DIRECT} at most"
         )
-    from pyamg import ruge_stuben_solver
+    from pyamg import ruge_stuben_solver, smoothed_aggregation_solver
+    from pyamg.multilevel import MultilevelSolver
+    from pyamg.relaxation.smoothing import change_smoothers
 
     plain = sp.csr_matrix((matrix.data, matrix.indices.astype(np.int32), matrix.indptr.astype(np.int32)), matrix.shape)
-    levels = ruge_stuben_solver(plain, max_coarse=_COARSE, max_levels=25, coarse_solver="splu")
-    preconditioner = levels.aspreconditioner(cycle="V")
+    levels, coarse = [], plain
+    while coarse.shape[0] > _COARSE and coarse.nnz < _DENSE * coarse.shape[0]:
+        two = ruge_stuben_solver(coarse, max_levels=2, max_coarse=1, coarse_solver="splu").levels
+        if len(two) < 2:
+            break
+        levels.append(two[0])
+        coarse = sp.csr_matrix(two[1].A)
+    levels += smoothed_aggregation_solver(coarse, max_coarse=_COARSE, coarse_solver="splu").levels
+    cycle = MultilevelSolver(levels, coarse_solver="splu")
+    smoother = ("gauss_seidel", {"sweep": "symmetric"})
+    change_smoothers(cycle, smoother, smoother)
+    preconditioner = cycle.aspreconditioner(cycle="V")
 
     def solve(right: Floats) -> Floats:
         found = np.empty_like(right)

@@ -6,6 +6,7 @@ import copy
 import datetime
 import math
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from fabrics import fibrils_through, straight
 
 from circuittex.base.errors import DesignError
 from circuittex.contact.curve import curve_table
-from circuittex.design import design_hash, load_design, parse_design, starter
+from circuittex.design import design_hash, load_design, parse_design, plain_weave, starter
 from circuittex.geometry import build_mesh
 
 MISSING = object()
@@ -193,7 +194,7 @@ BAD: list[tuple[list[tuple[Keys, Any]], str, str]] = [
     ([(("numerics", "elements"), 8000)], "numerics.elements", "80 fibrils of that many elements exceed 500000"),
     ([(("numerics", "order"), 3)], "numerics.order", "from 1 to 2"),
     ([(("numerics", "order"), "2")], "numerics.order", "whole number"),
-    ([(("numerics", "contact_points"), 0)], "numerics.contact_points", "from 1 to 20"),
+    ([(("numerics", "contact_points"), 0)], "numerics.contact_points", "from 1 to 40"),
     ([(("numerics", "section_degree"), 3)], "numerics.section_degree", "from 6"),
     ([(("numerics", "tolerance"), 0)], "numerics.tolerance", "> 0 and <= 0.1 or a text in N"),
     ([(("numerics", "tolerance"), 0.2)], "numerics.tolerance", "> 0 and <= 0.1 or a text in N"),
@@ -354,3 +355,15 @@ def test_missing_file_and_directory(tmp_path: Path) -> None:
 def test_not_even_a_mapping_of_names(value: Any) -> None:
     with pytest.raises(DesignError, match=r"^design: "):
         parse_design(value)
+
+
+def test_two_kinds_of_one_name_are_refused() -> None:
+    """Found in review: they shared one resistance that neither had."""
+    weave = plain_weave(yarns=2, rows=(1,)).weave
+    thin = replace(weave.warp[0], radius=0.1)
+    with pytest.raises(DesignError, match=r"two different yarns have this name"):
+        replace(weave, warp=(thin, weave.warp[1]))
+    other = replace(weave.warp[0].materials[0], youngs_modulus=1.0)
+    mixed = replace(weave.warp[0], name="another", materials=(other,))
+    with pytest.raises(DesignError, match=r"two different materials have this name"):
+        replace(weave, warp=(mixed, weave.warp[1]))

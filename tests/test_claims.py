@@ -270,7 +270,7 @@ def test_the_papers_cell_is_known_by_what_it_is() -> None:
     yarn = replace(design.weave.warp[0], name="silver")
     renamed = replace(design.weave, warp=(yarn,) * 4, weft=(yarn,) * 4)
     assert parameter_set(replace(design, weave=renamed)) == "paper-code"
-    thick = replace(renamed, weft=(replace(yarn, radius=0.16),) * 4)
+    thick = replace(renamed, weft=(replace(yarn, name="thick", radius=0.16),) * 4)
     assert parameter_set(replace(design, weave=thick)) is None
     assert parameter_set(replace(design, contact=replace(design.contact, conductivity=0.02))) is None
     assert parameter_set(replace(design, electrical=replace(design.electrical, conduction="current"))) is None

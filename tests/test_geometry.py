@@ -162,7 +162,7 @@ def test_mesh_tables(elements: int, order: int) -> None:
 def test_properties_follow_the_fibril() -> None:
     base = plain_weave()
     kind = base.weave.warp[0]
-    core = dataclasses.replace(kind.materials[0], electrical_conductivity=0.0, density=2.0)
+    core = dataclasses.replace(kind.materials[0], name="core", electrical_conductivity=0.0, density=2.0)
     other = dataclasses.replace(kind, name="core", radius=0.1, rows=(2, 1), materials=(core, kind.materials[0], core))
     weave = dataclasses.replace(base.weave, warp=(kind, other, kind, kind))
     mesh = build_mesh(dataclasses.replace(base, weave=weave))

@@ -26,7 +26,8 @@ def tiny() -> Design:
 
 
 def insulating(yarn: Yarn) -> Yarn:
-    return replace(yarn, materials=tuple(replace(m, electrical_conductivity=0.0) for m in yarn.materials))
+    materials = tuple(replace(m, name="insulating", electrical_conductivity=0.0) for m in yarn.materials)
+    return replace(yarn, name="insulating", materials=materials)
 
 
 def without_probes() -> Design:

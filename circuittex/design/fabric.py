@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import field
 from math import pi
 
-from circuittex.base.frozen import frozen
+from circuittex.base.frozen import frozen, same
 from circuittex.design.checks import name, refuse, store, whole
 from circuittex.design.declaration import check, number
 
@@ -153,8 +154,19 @@ class Weave:
                 raise refuse(
                     f"weave.{which}", len(getattr(self, which)), f"the draft needs {wanted} yarns, one for each {side}"
                 )
+        self._check_names()
         self._check_proportions()
         self._check_curvature()
+
+    def _check_names(self) -> None:
+        # Resistances are fitted and listed by name: two kinds under one would share what neither has.
+        materials = (material for yarn in self.yarns for material in yarn.materials)
+        named: tuple[tuple[str, Iterable[Yarn | Material]], ...] = (("yarns", self.yarns), ("materials", materials))
+        for kind, things in named:
+            known: dict[str, Yarn | Material] = {}
+            for each in things:
+                if not same(known.setdefault(each.name, each), each):
+                    raise refuse(f"{kind}.{each.name}", each.name, f"two different {kind} have this name")
 
     def _check_proportions(self) -> None:
         # Lengths against one another, so that a design of any size is judged alike.

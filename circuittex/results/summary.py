@@ -42,7 +42,8 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
     ``deepest_overlap``, ``largest_stress_MPa``
         the deepest overlap of two fibrils over R + R', and the largest force of a section over its reference area
     ``doubts``
-        why the state cannot be right or trusted, in sentences: overlaps, stresses, temperatures; empty if all is well
+        why the state cannot be right or trusted, in sentences: overlaps, stresses, temperatures, the mesh; empty if
+        all is well
     ``netlist``
         path of the detailed netlist, relative to the folder of the file
     ``error_estimate``

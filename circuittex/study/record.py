@@ -80,7 +80,7 @@ def _way_out(design: Design, error: ConvergenceError) -> str:
         return ""
     if len(error.history) > design.numerics.max_iterations:
         return f"; raise numerics.max_iterations above {design.numerics.max_iterations} or load in smaller steps"
-    other = f"another number of numerics.elements than {design.numerics.elements}"
+    other = f"another number of numerics.elements than {design.resolution.elements}"
     return f"; try {other}, a larger numerics.tolerance or smaller steps"
 
 
@@ -170,7 +170,8 @@ def outcome_of(design: Design, mesh: FibrilMesh, equilibrium: Equilibrium) -> Ou
     fields = solve_probes(contacts, design.terminals, design.probes, contact_heat=design.electrical.contact_heat)
     currents = tuple(float(field.currents[0]) for field in fields)
     merged = simplified(design, contacts).contacts
-    fit = fit_network(currents, design, port_matrix(build_circuit(merged, conducting_ends(mesh))))
+    told = _told(fields, probe_circuits(contacts, design.terminals, design.probes), design)
+    fit = fit_network(told, design, port_matrix(build_circuit(merged, conducting_ends(mesh))))
     return outcome(clamp_force(mesh, equilibrium.reaction), currents, fit, equilibrium.energy)
 
 

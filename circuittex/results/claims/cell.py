@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -98,11 +98,12 @@ def _ends(design: Design, probe: Probe) -> tuple[object, ...]:
     return ends[probe.source], ends[probe.sink]
 
 
-def _nameless(weave: Weave) -> Weave:
-    """The weave without the names of its yarns and materials."""
+def _nameless(weave: Weave) -> tuple[object, ...]:
+    """What the weave is, without the names of its yarns and materials."""
 
     def plain(yarn: Yarn) -> Yarn:
         materials = tuple(replace(material, name="material") for material in yarn.materials)
         return replace(yarn, name="yarn", materials=materials)
 
-    return replace(weave, warp=tuple(map(plain, weave.warp)), weft=tuple(map(plain, weave.weft)))
+    rest = [getattr(weave, each.name) for each in fields(weave) if each.name not in ("warp", "weft")]
+    return tuple(map(plain, weave.warp)), tuple(map(plain, weave.weft)), *rest

@@ -32,7 +32,7 @@ def section_figure(study: Study, record: Record) -> Figure:
             for axes, axis, other in ((row[0], 0, weft), (row[1], 1, warp)):
                 place = float(x[mesh.yarn[mesh.node_fibril] == other, 0, axis].mean())
                 _draw_cut(axes, mesh, x, axis, place)
-                axes.set_title(f"{name}: {'xy'[axis]} = {place:.2f} mm")
+                axes.set_title(f"{name}: {'xy'[axis]} = {place:.3g} mm")
                 axes.set_ylabel("z (mm)")
             _zoom(row[0], mesh, x, warp)
         grid[1, 0].set_xlabel(f"y (mm), across {mesh.yarn_names[warp]}")

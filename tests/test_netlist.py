@@ -312,6 +312,33 @@ def test_pyspice_simulates_in_the_shared_library():
     np.testing.assert_allclose(found, solution.voltage, atol=SIMULATED)
 
 
+SUBCIRCUIT = """
+import json
+from circuittex.electrical.network.circuit import reduced_circuit
+from circuittex.netlist import to_pyspice_subcircuit
+from PySpice.Spice.Netlist import Circuit
+piece = reduced_circuit((26, 26), 0.25, 40.0)
+circuit = Circuit("a large piece")
+circuit.subcircuit(to_pyspice_subcircuit(piece, "panel"))
+circuit.X("1", "panel", *(circuit.gnd if port == "weft26_plus" else port for port in piece.ports))
+circuit.V("1", "warp1_minus", circuit.gnd, 1)
+nodes = circuit.simulator().operating_point().nodes
+print(json.dumps({name: float(volts[0]) for name, volts in nodes.items() if "." not in name}))
+"""
+
+
+def test_pyspice_takes_sub_circuits_of_any_size():
+    done = subprocess.run([sys.executable, "-c", SUBCIRCUIT], capture_output=True, text=True, timeout=100, check=False)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout.splitlines()[-1])
+    piece = reduced_circuit((26, 26), 0.25, 40.0)
+    assert piece.n_resistors == 2080
+    solution = solve_nodal(piece, {"warp1_minus": 1.0, "weft26_plus": 0.0})
+    volts = dict(zip(piece.ports, solution.voltage[piece.port_node], strict=True))
+    assert set(found) == set(piece.ports) - {"weft26_plus"}
+    np.testing.assert_allclose(list(found.values()), [volts[port] for port in found], rtol=1e-9)
+
+
 def test_pyspice_refuses_large_circuits():
     with pytest.raises(CircuitError, match="2080 resistors are too many for PySpice"):
         to_pyspice(reduced_circuit((26, 26), 1.0, 1.0), {"warp1_minus": 1.0})

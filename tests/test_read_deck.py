@@ -17,6 +17,7 @@ from spicelib import SpiceEditor
 from circuittex.base.errors import CircuitError, NgspiceError
 from circuittex.electrical.network.circuit import reduced_circuit
 from circuittex.electrical.network.nodal import solve_nodal
+from circuittex.electrical.spice.expression import RESERVED
 from circuittex.electrical.spice.ngspice import Plot, find_ngspice, read_raw, run_deck
 from circuittex.netlist import Deck, deck, pin_names, read_deck
 
@@ -165,6 +166,37 @@ def decks(draw: st.DrawFn) -> str:
     return "\n".join([*lines, ".op", ".end", ""])
 
 
+NAMES = [
+    *("and", "or", "not", "mod", "div", "defined", "if", "table", "pwl", "stp", "ddt", "var", "vec", "u"),
+    *("pi", "e", "c", "kelvin", "echarge", "boltz", "yes", "no", "true", "false", "nan", "inf", "temp", "gmin", "tnom"),
+    *("i", "v", "x", "r", "l", "w", "m", "k", "t", "g", "meg", "mil", "params", "dc", "begin", "end", "while", "for"),
+]
+"""Words of ngspice's expressions and controls, its constants, its multiplier, letters of elements, suffixes."""
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_parameter_of_any_other_name_is_what_ngspice_reads(name: str, tmp_path: Path) -> None:
+    """Names that stand for something in ngspice's expressions, unless it lets a parameter have them, are refused."""
+    inner = f".subckt s p {name}=2k\nR1 p 0 {{{name}+1}}\n.ends"
+    found = read(
+        f"t\n.param {name}=3k\nV1 a 0 1\nR1 a b {{{name}*2}}\nX1 b s {name}={{{name}}}\n{inner}\n.op\n", tmp_path
+    )
+    assert_same(found, ngspice(tmp_path))
+
+
+def test_no_reserved_name_is_a_parameter_in_ngspice(tmp_path: Path) -> None:
+    """The list of them holds nothing that could be read."""
+    for name in sorted(RESERVED):
+        text = f"t\n.param {name}=3k\nV1 a 0 1\nR1 a b 1k\nR2 b 0 {{{name}+1}}\n.op\n.end\n"
+        (tmp_path / "deck.cir").write_text(text, encoding="ascii")
+        (tmp_path / "out.raw").unlink(missing_ok=True)
+        try:
+            found = ngspice(tmp_path).voltage(["b"])[0, 0]
+        except (NgspiceError, subprocess.CalledProcessError):
+            continue
+        assert abs(found - 3001 / 4001) > 1e-6, name
+
+
 @given(text=decks())
 def test_random_decks_are_what_ngspice_reads(text: str, tmp_path_factory: pytest.TempPathFactory) -> None:
     folder = tmp_path_factory.mktemp("random")
@@ -248,6 +280,11 @@ BASE = "t\nV1 a 0 1\nR9 a 0 1\n"
         (".param p=1 p=2", "given twice"),
         (".param p = 1 + 2", "'1 \\+ 2' must stand in braces"),
         (".param p", "a .param is followed by"),
+        (".param temper=3", "'temper' means something else to simulators"),
+        (".subckt s p SQRT=3\nR1 p 0 {sqrt}\n.ends", "'sqrt' means something else to simulators"),
+        ("R1 a 0 {2mil*1meg}", "'2mil': in expressions, simulators disagree about mil"),
+        (".param p=-8\nR1 a 0 {p**3+10k}", "a power of -8.0, which is negative: simulators disagree"),
+        (".subckt s p qPARAMS: r=1\n.ends", "'qparams:' is no node"),
         ("V2 b c 1", "against node 0"),
         ("V2 0 gnd 1", "against node 0"),
         ("V2 0 a 1", "another source drives the node 'a' already"),

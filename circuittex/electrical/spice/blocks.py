@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from circuittex.electrical.spice.cards import Card
-from circuittex.electrical.spice.expression import DEEPEST, Expression, compile_expression, read_number
+from circuittex.electrical.spice.expression import DEEPEST, RESERVED, Expression, compile_expression, read_number
 
 ALLOWED = (
     "allowed are R, V and X cards, .subckt, .ends, .param, .include, .lib and .end; "
@@ -181,7 +181,7 @@ _ELEMENTS: dict[str, Callable[[Card, str], Resistor | Source | Call]] = {"r": _r
 
 
 def _node(word: str) -> str:
-    if word[0] in "{'=":
+    if word[0] in "{'=" or "params:" in word:
         raise ValueError(f"{word!r} is no node")
     if word == "ground":
         raise ValueError("some simulators take the node 'ground' for node 0 and some do not; give it another name")
@@ -214,5 +214,7 @@ def _split(text: str) -> tuple[list[str], dict[str, Expression]]:
             raise ValueError(f"{value[:40]!r} must stand in braces: simulators disagree about where it ends")
         if this[1] in assigned:
             raise ValueError(f"{this[1]!r} is given twice")
+        if this[1] in RESERVED:
+            raise ValueError(f"{this[1]!r} means something else to simulators; give the parameter another name")
         assigned[this[1]] = compile_expression(value)
     return words, assigned

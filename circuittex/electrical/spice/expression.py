@@ -35,6 +35,14 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
     "max": (2, max),
 }
 """What an expression may call, and with how many values."""
+RESERVED = frozenset(
+    {
+        *("abs", "acos", "acosh", "agauss", "arctan", "asin", "asinh", "atan", "atanh", "aunif", "ceil", "cos", "cosh"),
+        *("exp", "floor", "gauss", "int", "limit", "ln", "log", "log10", "max", "min", "nint", "pow", "pwr", "sgn"),
+        *("sin", "sinh", "sqr", "sqrt", "tan", "tanh", "ternary_fcn", "unif", "hertz", "temper", "time"),
+    }
+)
+"""Names that mean something to simulators, and no parameter: ngspice takes another value for one, without a word."""
 _OPERATORS: dict[str, Callable[..., float]] = {
     "+": lambda a, b: a + b,
     "-": lambda a, b: a - b,
@@ -109,6 +117,8 @@ def evaluate(expression: Expression, value_of: Callable[[str], float]) -> float:
             name, count = step
             values = stack[-count:]
             del stack[-count:]
+            if name == "^" and values[0] < 0.0:  # ngspice takes the power of its magnitude
+                raise ValueError(f"a power of {values[0]!r}, which is negative: simulators disagree about it")
             try:
                 value = float(_CALLS[name](*values))
             except (ArithmeticError, ValueError):
@@ -193,6 +203,8 @@ class _Parser:
         kind, token = self.kind, self.token
         self.next()
         if kind == "number":
+            if "mil" in token:
+                raise ValueError(f"{token!r}: in expressions, simulators disagree about mil")
             self.steps.append(read_number(token))
         elif kind == "name" and self.at("("):
             self.call(token, depth + 1)

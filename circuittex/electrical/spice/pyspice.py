@@ -1,4 +1,4 @@
-"""A circuit as PySpice objects, for circuits of a designer's size."""
+"""A circuit as PySpice objects: sub-circuits of any size, and driven circuits of a designer's size."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from circuittex.electrical.network.circuit import Circuit, reached_part
 from circuittex.electrical.network.names import unique_names
 
 LARGEST = 2000
-"""Resistors of the largest circuit that is given to PySpice."""
+"""Resistors of the largest driven circuit that is given to PySpice."""
 
 
 def to_pyspice(circuit: Circuit, drive: Mapping[str, float], title: str = "circuittex") -> Any:
@@ -23,7 +23,12 @@ def to_pyspice(circuit: Circuit, drive: Mapping[str, float], title: str = "circu
 
     Raises `CircuitError` for more than `LARGEST` resistors.
     """
-    part = _small(reached_part(circuit, drive))
+    part = reached_part(circuit, drive)
+    if part.n_resistors > LARGEST:
+        raise CircuitError(
+            f"{part.n_resistors} resistors are too many for PySpice, which simulates them in the same process "
+            f"(at most {LARGEST}); write the text with circuittex.netlist.deck"
+        )
     _name_library()
     from PySpice.Spice.Netlist import Circuit as PySpiceCircuit
 
@@ -39,26 +44,14 @@ def to_pyspice_subcircuit(circuit: Circuit, name: str) -> Any:
     """Return a `PySpice.Spice.Netlist.SubCircuit` called `name` whose pins are the ports, in their order.
 
     A circuit takes it with `.subcircuit(...)` and places it with `.X('1', name, node, node, ...)`.
-
-    Raises `CircuitError` for more than `LARGEST` resistors.
     """
-    part = _small(circuit)
     _name_library()
     from PySpice.Spice.Netlist import SubCircuit
 
-    nodes = unique_names(part.node_names)
-    built = SubCircuit(unique_names([name])[0], *(nodes[pin] for pin in part.port_node.tolist()))
-    _add_resistors(built, part)
+    nodes = unique_names(circuit.node_names)
+    built = SubCircuit(unique_names([name])[0], *(nodes[pin] for pin in circuit.port_node.tolist()))
+    _add_resistors(built, circuit)
     return built
-
-
-def _small(part: Circuit) -> Circuit:
-    if part.n_resistors > LARGEST:
-        raise CircuitError(
-            f"{part.n_resistors} resistors are too many for PySpice, which builds and parses them one by one "
-            f"(at most {LARGEST}); write the text with circuittex.netlist.deck"
-        )
-    return part
 
 
 def _name_library() -> None:

@@ -109,6 +109,52 @@ def test_a_reader_beside_a_run_sees_one_state_more_at_a_time(tmp_path: Path) -> 
     assert seen[-1] > 5
 
 
+@given(pauses=st.lists(st.integers(0, 4), min_size=12, max_size=12))
+def test_a_snapshot_is_one_version(tmp_path_factory: pytest.TempPathFactory, pauses: list[int]) -> None:
+    """However the steps of a change fall between those of a reader, it has the old version or the new one whole."""
+    path = tmp_path_factory.mktemp("snapshot") / "results.h5"
+    old = bytes([1]) * (3 * PAGE) + bytes([2]) * 100
+    path.write_bytes(old)
+    with path.open("rb") as file:
+        changed = journal.overlay(path, file)
+        for place in (10, 2 * PAGE + 7, len(old) + 5):
+            changed.seek(place)
+            changed.write(b"new")
+        changed.seek(0)
+        new = changed.read(-1)
+    beside = journal._journal(path)
+
+    def change() -> Iterator[None]:
+        with path.open("ab") as file:
+            file.write(changed.tail)
+        yield
+        journal._write_journal(beside, changed)
+        for offset, page in changed.pages.items():
+            yield
+            journal._apply(path, {offset: page})
+        yield
+        beside.unlink()
+
+    steps, left = change(), iter(pauses)
+    for _ in range(next(left)):
+        next(steps, None)
+
+    def pausing(function: Callable[..., Any]) -> Callable[..., Any]:
+        def paused(*arguments: Any) -> Any:
+            for _ in range(next(left, 0)):
+                next(steps, None)
+            return function(*arguments)
+
+        return paused
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(journal, "PIECE", PAGE)
+        for name in ("_pages", "_reads", "_lay"):
+            patch.setattr(journal, name, pausing(getattr(journal, name)))
+        taken = journal.snapshot(path).read(-1)
+    assert taken == new or taken[: len(old)] == old
+
+
 def test_what_is_there_is_not_written_again(tmp_path: Path) -> None:
     """A large file grows by what is new: all but a few pages of the old one stay as they are."""
     study = synthetic_study(3, contacts=3000)

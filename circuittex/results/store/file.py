@@ -18,7 +18,7 @@ from circuittex.results.bifurcation import BranchCheck
 from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.records import EXAMINATIONS, Examination, Record, Study, with_examination
 from circuittex.results.store.archive import ATTRIBUTES, MEANING, Digests, Former, Reader, Writer, reader_of, registry
-from circuittex.results.store.journal import Overlay, changing, commit, finish, overlay, snapshot
+from circuittex.results.store.journal import Overlay, commit, finish, overlay, snapshot
 from circuittex.results.store.meaning import meanings, summary
 
 FORMAT = "circuittex results"
@@ -120,15 +120,8 @@ def load_study(path: str | Path) -> Study:
     path = path / RESULTS if path.is_dir() else path
     if not path.is_file():
         raise StoreError(f"{path}: there is no results file here")
-    before = changing(path)
     with _as_store_error(path, "cannot be read"):
-        try:
-            with path.open("rb") as handle:
-                return _read(overlay(path, handle))
-        except Exception:  # whatever h5py makes of pages that change while it reads them
-            if changing(path) == before:
-                raise
-            return _read(snapshot(path))
+        return _read(snapshot(path))
 
 
 def _read(content: Overlay) -> Study:

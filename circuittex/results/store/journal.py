@@ -22,6 +22,8 @@ from circuittex.base.atomic import replacing
 
 PAGE = 4096
 """Bytes that are changed together."""
+PIECE = 4096 * PAGE
+"""Bytes that are compared at once."""
 SUFFIX = ".journal"
 MAGIC = b"circuittex journal 1\n"
 _HEAD, _ENTRY = struct.Struct("<QQ"), struct.Struct("<QI")  # size of the file, number of pages; offset, length
@@ -125,12 +127,39 @@ def overlay(path: Path, file: BinaryIO) -> Overlay:
 
 
 def snapshot(path: Path) -> Overlay:
-    """The file at `path` as it is at one moment, in memory: a change that comes while it is read begins that anew."""
+    """The file at `path` as it is at one moment, in memory, while others change it.
+
+    A page has the same content before and after that moment, at which the journal is read: so it had it then, and the
+    pages that the journal holds are taken from there. HDF5 must not be let near pages of two versions: 1.14.2 crashes.
+    """
     while True:
-        before = changing(path)
-        taken = overlay(path, io.BytesIO(path.read_bytes()))
-        if changing(path) == before:
+        taken = Overlay(None, 0)
+        taken.tail = bytearray(path.stat().st_size)
+        with path.open("rb") as file:
+            file.readinto(taken.tail)
+        pages = _pages(_journal(path), len(taken.tail))
+        _lay(pages, taken.tail, 0)
+        if _reads(path, taken.tail, pages):
             return taken
+
+
+def _reads(path: Path, content: bytearray, pages: Mapping[int, bytes]) -> bool:
+    """Whether the file at `path` with these pages laid over it reads so, at some moment for each part."""
+    view = memoryview(content)
+    with path.open("rb") as file:
+        for start in range(0, len(content), PIECE):
+            piece = bytearray(file.read(PIECE))
+            _lay(pages, piece, start)
+            if piece != view[start : start + PIECE]:
+                return False
+        return not file.read(1)
+
+
+def _lay(pages: Mapping[int, bytes], piece: bytearray, start: int) -> None:
+    """Lay pages over the piece of a file that begins at `start`: a page lies in it whole or not at all."""
+    for offset, page in pages.items():
+        if 0 <= offset - start < len(piece):
+            piece[offset - start : offset - start + len(page)] = page
 
 
 def finish(path: Path) -> None:
@@ -171,12 +200,6 @@ def _apply(path: Path, pages: Mapping[int, bytes | bytearray]) -> None:
             file.write(page)
         file.flush()
         os.fsync(file.fileno())
-
-
-def changing(path: Path) -> tuple[int, int, bool]:
-    """What tells, before and after a file was read, whether it was changed meanwhile."""
-    status = path.stat()
-    return status.st_mtime_ns, status.st_size, _journal(path).exists()
 
 
 def _journal(path: Path) -> Path:

@@ -41,7 +41,7 @@ style: $(VENV)/.ready
 types: $(VENV)/.ready
 	$(PY) -m mypy
 
-docs: $(VENV)/.ready-docs ## build the documentation into docs/_build, warnings are errors
+docs: $(VENV)/.ready-docs ngspice ## build the documentation into docs/_build, warnings are errors
 	$(PY) -m sphinx -W --keep-going -E -q -b html docs docs/_build
 	@echo "documentation: docs/_build/index.html"
 

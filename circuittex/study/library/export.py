@@ -69,8 +69,7 @@ def export_library(
     networks = {part.name: part.network for part in found}
     _write_examples(folder / "examples", cells, networks)
     _write_probes(folder / "examples", study, chosen)
-    ranges = {each: (float(network.strain[0]), float(network.strain[-1])) for each, network in networks.items()}
-    write_symbols(folder, word, study.design.name, cells, ranges)
+    write_symbols(folder, word, study.design.name, cells, networks)
     write_datasheet(folder, study, known, cells, networks)
     library = {
         "format": FORMAT,

@@ -28,6 +28,6 @@ def instance(cell: Cell, reference: str, nodes: Mapping[str, str], **parameters:
             raise CircuitError(f"{cell.name} has no {what} {unknown[0]!r}: it has {', '.join(known) or 'none'}")
     words = [reference, *(nodes.get(name, f"{reference}_{name}") for name in names), cell.name]
     if parameters:
-        given = " ".join(f"{name}={float(value)!r}" for name, value in parameters.items())
-        words.append(DIALECTS[cell.dialect].parameters + given)
+        values = " ".join(f"{name}={float(value)!r}" for name, value in parameters.items())
+        words.append(DIALECTS[cell.dialect].parameters + values)
     return " ".join(words)

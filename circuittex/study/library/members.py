@@ -20,7 +20,7 @@ def is_ensemble(folder: Path) -> bool:
 
 
 def complete_members(folder: str | Path) -> Iterator[Study]:
-    """The members of the ensemble in `folder` that have all their states, one at a time, in their order: they are large.
+    """The members of an ensemble that have all their states, one at a time, in their order: they are large.
 
     Raises `StoreError` where there is none.
     """

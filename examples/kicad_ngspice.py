@@ -17,7 +17,8 @@ import circuittex as ct
 
 # %%
 # A small fabric as a library. `kicad/example` in it is a project whose sheet has the fabric in a divider, while strain
-# goes through its range ten times a second; `fabric_example.cir` is the netlist that KiCad makes of the sheet.
+# goes through its range ten times a second; `fabric_example.cir` is the netlist of this sheet, by the
+# rules of KiCad, which itself is not run here.
 
 stretch = ct.uniaxial("stretch", ct.equal_steps(0.04, 4))
 study = ct.run_study(ct.plain_weave("paper-code", yarns=2, rows=(1,), loading=(stretch,)))

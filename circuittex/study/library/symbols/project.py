@@ -118,7 +118,7 @@ def _strained(cell: Cell) -> bool:
 
 
 def _netlist(cell: Cell, shown: Divider) -> str:
-    """What KiCad exports of the sheet, with the nets named by the sheet's labels."""
+    """The sheet as a netlist, by the rules of KiCad: reference, nodes in the order of the file, name, parameters."""
     first = next(pin.name for pin in cell.pins if pin.kind == "electrical")
     nets = {first: "sense", shown.sink: "0"} | {pin.name: pin.name for pin in cell.pins if pin.kind != "electrical"}
     lines = [f"* {NAME}: the netlist of {NAME}.kicad_sch", f".include {LIBRARY}{cell.file}", instance(cell, "X1", nets)]

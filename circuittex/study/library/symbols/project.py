@@ -9,10 +9,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from circuittex.base.frozen import frozen
-from circuittex.electrical.network.ports import resistances
 from circuittex.study.library.cell import Cell
 from circuittex.study.library.instance import instance
-from circuittex.study.library.network import Network, matrix_at
+from circuittex.study.library.network import Network, farthest
 from circuittex.study.library.symbols.expression import Text, write
 from circuittex.study.library.symbols.kicad import (
     PITCH,
@@ -35,8 +34,6 @@ LIBRARY = "../../"
 SUPPLY = "3.3"
 DIRECTIVES = {True: ".tran 1m 100m", False: ".op"}
 """What is simulated where strain is a pin, and where it is no input."""
-ALIKE = 1e-6
-"""Relative: of resistances that differ by less the first is the largest."""
 LEFT, TOP = 16, 30
 """Where the sources and the resistor are, in units of the grid of the sheet."""
 
@@ -63,8 +60,8 @@ class Item:
 class Divider:
     """What the project shows: a supply, a resistor, and the fabric from its first pin to another."""
 
-    sink: str
-    """The pin of the fabric at ground."""
+    ends: tuple[str, str]
+    """The pins of the fabric at the resistor and at ground."""
     ohm: str
     """The resistor."""
     low: float
@@ -74,19 +71,15 @@ class Divider:
 
 
 def divider(network: Network) -> Divider:
-    """The fabric between its first pin and the one with the largest resistance to it, and a resistor like it.
-
-    Along one yarn a stretch may change nothing; the way to another yarn leads through contacts.
+    """The fabric between two pins far apart, and a resistor like it.
 
     >>> network = Network(("a", "b", "c"), ("a_b", "b_c"), (("a", "b"), ("b", "c")), np.zeros(1), np.full((1, 2), 0.1))
     >>> divider(network)
-    Divider(sink='c', ohm='20', low=0.0, high=0.0)
+    Divider(ends=('a', 'c'), ohm='20', low=0.0, high=0.0)
     """
-    ohm = resistances(matrix_at(network, network.conductance[0]))[0]
-    reached = np.where(np.isfinite(ohm), ohm, 0.0)
-    k = int(np.argmax(reached > (1.0 - ALIKE) * reached.max()))
-    value = np.format_float_positional(float(f"{reached[k]:.1g}"), trim="-")
-    return Divider(network.pins[k], value, float(network.strain[0]), float(network.strain[-1]))
+    ends, ohm = farthest(network)
+    value = np.format_float_positional(float(f"{ohm:.1g}"), trim="-")
+    return Divider(ends, value, float(network.strain[0]), float(network.strain[-1]))
 
 
 def example_project(cell: Cell, design: str, symbols: str, shown: Divider) -> dict[str, str]:
@@ -97,7 +90,7 @@ def example_project(cell: Cell, design: str, symbols: str, shown: Divider) -> di
     >>> from circuittex.study.library.cell import Pin
     >>> pins = (Pin("a", "left", "electrical"), Pin("b", "right", "electrical"))
     >>> piece = Cell("piece", "ports", "a piece", pins, (), "ngspice/piece.lib", "ngspice")
-    >>> sorted(example_project(piece, "weave", "fabric.kicad_sym", Divider("b", "100", 0.0, 0.0)))
+    >>> sorted(example_project(piece, "weave", "fabric.kicad_sym", Divider(("a", "b"), "100", 0.0, 0.0)))
     ['fabric_example.cir', 'fabric_example.kicad_pro', 'fabric_example.kicad_sch', 'sym-lib-table']
     """
     project = {"meta": {"filename": f"{NAME}.kicad_pro", "version": 1}, "sheets": [[_id("sheet"), ""]]}
@@ -119,13 +112,14 @@ def _strained(cell: Cell) -> bool:
 
 def _netlist(cell: Cell, shown: Divider) -> str:
     """The sheet as a netlist, by the rules of KiCad: reference, nodes in the order of the file, name, parameters."""
-    first = next(pin.name for pin in cell.pins if pin.kind == "electrical")
-    nets = {first: "sense", shown.sink: "0"} | {pin.name: pin.name for pin in cell.pins if pin.kind != "electrical"}
+    nets = dict(zip(shown.ends, ("sense", "0"), strict=True))
+    nets |= {pin.name: pin.name for pin in cell.pins if pin.kind != "electrical"}
     lines = [f"* {NAME}: the netlist of {NAME}.kicad_sch", f".include {LIBRARY}{cell.file}", instance(cell, "X1", nets)]
     lines += [f"V1 supply 0 DC {SUPPLY}", f"R1 supply sense {shown.ohm}"]
     if _strained(cell):
         dc, amplitude = _sine(shown)
         lines.append(f"V2 strain 0 SIN( {dc!r} {amplitude!r} 10 0 0 -90 )")
+        lines.append(".print tran v(strain) v(sense) v(out_of_range)")
     return "\n".join([*lines, DIRECTIVES[_strained(cell)], ".end", ""])
 
 
@@ -146,7 +140,7 @@ def _sheet(cell: Cell, design: str, nickname: str, shown: Divider) -> Expression
         dc, amplitude = _sine(shown)
         sine = f"dc={dc!r} ampl={amplitude!r} f=10 td=0 theta=0 phase=-90"
         items.append(_source("V2", _grid(LEFT, TOP + 12), "SIN", sine))
-    marks = list(_marks(cell, shown.sink))
+    marks = list(_marks(cell, shown.ends))
     grounds = [at for name, at in marks if name == "0"]
     items += [
         Item("power:GND", f"#PWR0{k}", at, {"Reference": "#PWR", "Value": "GND"}, 1) for k, at in enumerate(grounds, 1)
@@ -172,11 +166,10 @@ def _sheet(cell: Cell, design: str, nickname: str, shown: Divider) -> Expression
     ]
 
 
-def _marks(cell: Cell, sink: str) -> Iterator[tuple[str, Point]]:
+def _marks(cell: Cell, ends: tuple[str, str]) -> Iterator[tuple[str, Point]]:
     """Nets by name and place: '0' is ground and '' no connection."""
     found = layout(cell)
-    first = next(pin.name for pin in cell.pins if pin.kind == "electrical")
-    nets = {first: "sense", sink: "0"}
+    nets = dict(zip(ends, ("sense", "0"), strict=True))
     for place in found.places:
         x, y = position(found, place.x, place.y)
         at = _place(cell)

@@ -20,7 +20,7 @@ import circuittex as ct
 # goes through its range ten times a second; `fabric_example.cir` is the netlist of this sheet, by the
 # rules of KiCad, which itself is not run here.
 
-stretch = ct.uniaxial("stretch", ct.equal_steps(0.04, 4))
+stretch = ct.uniaxial("stretch", ct.equal_steps(0.04, 2))
 study = ct.run_study(ct.plain_weave("paper-code", yarns=2, rows=(1,), loading=(stretch,)))
 library = tempfile.TemporaryDirectory()
 parts = {cell.name: cell for cell in ct.export_library(study, library.name, dialects=("ngspice",))}

@@ -24,6 +24,7 @@ _HOMES = {
     "electrical.network.circuit": ("Circuit", "build_circuit", "reduced_circuit", "to_networkx", "yarn_end_terminals"),
     "electrical.network.nodal": ("solve_nodal",),
     "netlist": ("Header", "deck", "read_deck", "subcircuit", "to_pyspice", "to_pyspice_subcircuit"),
+    "electrical.spice.ngspice": ("read_raw", "run_deck"),
     "fit": ("fit_network",),
     "relaxation.relax": ("move", "relax"),
     "relaxation.increment": ("advance",),
@@ -31,6 +32,8 @@ _HOMES = {
     "study.ensemble": ("run_ensemble",),
     "study.kit": ("write_kit",),
     "study.library.export": ("export_library",),
+    "study.library.instance": ("instance",),
+    "study.library.members": ("complete_members",),
     "study.panel.statement": ("Cut", "Electrode", "Panel", "Seam"),
     "study.panel.cells": ("CellResistances", "cells_of_study"),
     "study.panel.reader": ("load_panel",),
@@ -85,6 +88,8 @@ if TYPE_CHECKING:
     from circuittex.electrical.network.circuit import to_networkx as to_networkx
     from circuittex.electrical.network.circuit import yarn_end_terminals as yarn_end_terminals
     from circuittex.electrical.network.nodal import solve_nodal as solve_nodal
+    from circuittex.electrical.spice.ngspice import read_raw as read_raw
+    from circuittex.electrical.spice.ngspice import run_deck as run_deck
     from circuittex.fit import fit_network as fit_network
     from circuittex.geometry.weave import build_mesh as build_mesh
     from circuittex.mech.configuration import initial_configuration as initial_configuration
@@ -106,6 +111,8 @@ if TYPE_CHECKING:
     from circuittex.study.ensemble import run_ensemble as run_ensemble
     from circuittex.study.kit import write_kit as write_kit
     from circuittex.study.library.export import export_library as export_library
+    from circuittex.study.library.instance import instance as instance
+    from circuittex.study.library.members import complete_members as complete_members
     from circuittex.study.panel.cells import CellResistances as CellResistances
     from circuittex.study.panel.cells import cells_of_study as cells_of_study
     from circuittex.study.panel.circuit import panel_circuit as panel_circuit

@@ -34,12 +34,13 @@ smartquotes = False
 
 def figures(block, block_vars, gallery_conf):
     """Pictures of a script: those of pyplot, and figures that circuittex's functions returned to a name."""
-    names = block_vars["example_globals"]
     shown = gallery_conf.setdefault("circuittex_shown", set())
+    named = [each for each in block_vars["example_globals"].values() if isinstance(each, Figure)]
+    new = [each for each in named if id(each) not in shown]
+    shown.update(map(id, new))  # those of pyplot too: closed after their block, they look like the others
     saved = []
-    for figure in names.values():
-        if isinstance(figure, Figure) and not hasattr(figure.canvas.manager, "num") and id(figure) not in shown:
-            shown.add(id(figure))
+    for figure in new:
+        if not hasattr(figure.canvas.manager, "num"):
             path = next(block_vars["image_path_iterator"])
             figure.savefig(path, dpi=100)
             saved.append(path)
@@ -56,6 +57,7 @@ sphinx_gallery_conf = {
     "show_signature": False,
     "write_computation_times": False,
     "min_reported_time": 1e6,
+    "capture_repr": (),  # numbers are printed; what a last line returns is none
     "abort_on_example_error": True,
 }
 

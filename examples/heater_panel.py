@@ -8,6 +8,7 @@ through crossings and weft yarns, so that the panel stays warm behind the tear, 
 
 from dataclasses import replace
 
+import matplotlib.pyplot as plt
 import numpy as np
 from scipy.fft import dctn, idctn
 
@@ -44,8 +45,17 @@ waves = np.add.outer(
 warmer = idctn(dctn(q) / (loss + spread * waves))
 print(f"{warmer.mean():.0f} K warmer than the air on average, {warmer.max():.0f} K at most")
 
+width, height = torn.size
+figure, axes = plt.subplots(layout="constrained")
+image = axes.imshow(warmer, origin="lower", extent=(0, width, 0, height), cmap="inferno")
+axes.plot((90, 90), (40, 80), "w--", label="tear")
+axes.set(title="temperature above that of the air", xlabel="x, mm", ylabel="y, mm")
+axes.legend(facecolor="0.5")
+figure.colorbar(image, ax=axes, label="K", shrink=0.8)
+
 # %%
-# Heat, and the gradient of the resistance between the bars: the crossings near the ends of the tear are what counts.
+# Heat before it spreads, and the gradient of the resistance between the bars: the crossings near the ends of the tear
+# are what counts.
 
 heat = ct.panel_figure(after, "heat")
 gradient = ct.panel_gradient(after, "left", "right")

@@ -47,5 +47,8 @@ for name, reading in (("others open", loose), ("others held", held)):
 figure, both = plt.subplots(1, 2, figsize=(8, 3.6), layout="constrained")
 for axes, title, reading in zip(both, ("others open", "others held at 0 V"), (loose, held), strict=True):
     image = axes.imshow(1e3 * reading, origin="lower", extent=(0.5, count + 0.5, 0.5, count + 0.5), vmin=0.0)
+    axes.plot(*np.array(pressed)[:, ::-1].T, "kx", label="pressed")
+    axes.plot(6, 6, "wo", fillstyle="none", markersize=14, label="ghost")
     axes.set(title=title, xlabel="column", ylabel="row")
-    figure.colorbar(image, ax=axes, label="mS")
+    axes.legend(loc="upper right", facecolor="0.7")
+    figure.colorbar(image, ax=axes, label="reading, mS", shrink=0.85)

@@ -25,6 +25,9 @@ from circuittex.command.options import build_parser
 from circuittex.design import load_design, starter
 from circuittex.electrical.spice.ngspice import run_deck
 from circuittex.results.store import load_study, write_study_start
+from circuittex.study.panel.circuit import ports_netlist
+from circuittex.study.panel.reader import load_panel
+from circuittex.study.panel.solution import solve_panel
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -277,6 +280,18 @@ def test_the_sensor_of_the_library_page_runs(folder: Path) -> None:
     assert strain.max() == pytest.approx(0.01, rel=1e-3)
     assert (np.abs(flag) < 1e-9).all()
     assert ((sense > 0.0) & (sense < 3.3)).all()
+
+
+def test_the_heating_panel_runs_behind_its_fuse(tmp_path: Path) -> None:
+    """What the battery feeds in is 12 V over the fuse and the resistance that the native solution has."""
+    (text,) = [inner for name, inner in shown("spice") if name == "panel.md"]
+    panel, _ = load_panel(ROOT / "examples" / "heater_panel.toml")
+    solution = solve_panel(panel)
+    (tmp_path / "panel_ports.lib").write_text(ports_netlist(solution), encoding="ascii")
+    plot = run_deck(text.replace("results/heater_panel/", f"{tmp_path}/")).plots[-1]
+    ohm = 0.02 + solution.resistance[0, 1]
+    assert -float(plot.current("v1")[0]) == pytest.approx(12.0 / ohm, rel=1e-6)  # ngspice's own tolerances
+    assert 0.0 < float(plot.voltage(["sense"])[0, 0]) < float(plot.voltage(["left"])[0, 0]) < 12.0
 
 
 def test_a_deck_runs_as_it_stands(computed: Path, tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from circuittex.study.library.cell import Cell, Pin
 from circuittex.study.library.export import export_library
 from circuittex.study.library.interpolation import pieces, value, without
 from circuittex.study.library.members import complete_members, is_ensemble
-from circuittex.study.library.network import Network, floating, ports_network
+from circuittex.study.library.network import Network, farthest, floating, ports_network
 from circuittex.study.library.parts import pins
 from circuittex.study.library.rating import rated_currents
 from circuittex.study.library.strain_path import branches
@@ -127,7 +127,16 @@ def test_no_two_nodes_or_devices_share_a_name() -> None:
 def test_parts_that_float_are_found() -> None:
     ends = (("a", "x"), ("x", "b"), ("d", "c"))
     network = Network(("a", "b", "c", "d", "e"), ("1", "2", "3"), ends, np.zeros(1), np.ones((1, 3)))
-    assert floating(network) == ("c", "e")
+    assert floating(network, "b") == ("c", "e")
+
+
+def test_examples_measure_between_pins_that_are_joined_and_far_apart() -> None:
+    """Of two ways of 1 and 3 ohm; 'z', the first pin, leads nowhere, and 'a' is not joined with all."""
+    ends = (("a", "b"), ("b", "x"), ("x", "c"), ("d", "e"))
+    network = Network(("z", "a", "b", "c", "d", "e"), ("1", "2", "3", "4"), ends, np.zeros(1), np.ones((1, 4)))
+    (source, sink), ohm = farthest(network)
+    assert (source, sink) == ("a", "c")
+    assert ohm == pytest.approx(3.0)
 
 
 def test_command_line_and_datasheet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,7 +11,10 @@ import numpy as np
 import pytest
 from library_cases import CELLS, answer, direct, listed, pins_of, study
 
+from circuittex.base.errors import CircuitError
+from circuittex.study.library.cell import Cell, Pin
 from circuittex.study.library.export import export_library
+from circuittex.study.library.instance import instance
 
 SECONDS = 100
 NAMES = [f"fabric_{end}" for end in CELLS]
@@ -57,6 +60,27 @@ def test_pyspice_finds_and_simulates_a_sub_circuit(library: Path, tmp_path: Path
     told = run(PYSPICE, tmp_path, str(library / "ngspice"), name, *names)
     assert told["found"] == sorted(cell["name"] for cell in listed(library, "ngspice"))
     np.testing.assert_allclose(told["volts"], direct(library, name), rtol=1e-6, atol=1e-9)
+
+
+def cell(library: Path, name: str) -> Cell:
+    (found,) = [dict(each) for each in listed(library, "ngspice") if each["name"] == name]
+    pins = tuple(Pin(**pin) for pin in found.pop("pins"))
+    return Cell(**{**found, "pins": pins, "parameters": tuple(map(tuple, found["parameters"]))})
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_instance_by_names_of_pins_is_the_sub_circuit(library: Path, name: str) -> None:
+    """Nodes are given backwards: names decide, not the order."""
+    names = pins_of((library / "ngspice" / f"{name}.lib").read_text("ascii"))
+    line = instance(cell(library, name), "X1", {pin: f"net_{pin}" for pin in reversed(names)})
+    np.testing.assert_allclose(answer(library, name, line), direct(library, name), rtol=1e-9, atol=1e-12)
+
+
+def test_an_instance_with_a_strange_pin_or_parameter_is_refused(library: Path) -> None:
+    with pytest.raises(CircuitError, match="fabric_ports has no pin 'warp9_plus': it has warp1_minus, "):
+        instance(cell(library, "fabric_ports"), "X1", {"warp9_plus": "0"})
+    with pytest.raises(CircuitError, match="fabric_ports has no parameter 'strain': it has none"):
+        instance(cell(library, "fabric_ports"), "X1", {}, strain=0.1)
 
 
 SKIDL = """

@@ -15,7 +15,7 @@ from kicad_netlist import card, fields, netlist, pins
 from kiutils.schematic import Schematic
 from kiutils.symbol import SymbolLib
 from kiutils.utils.sexpr import parse_sexp
-from library_cases import CELLS, answer, direct, listed, pins_of, study
+from library_cases import CELLS, answer, direct, listed, pins_of, resistor_matrix, study
 from spicelib.editor.asy_reader import AsyReader
 
 from circuittex.electrical.spice.ngspice import run_deck
@@ -25,7 +25,7 @@ from circuittex.study.library.symbols.expression import one_line
 from circuittex.study.library.symbols.kicad import symbol_library
 from circuittex.study.library.symbols.layout import layout
 from circuittex.study.library.symbols.ltspice import asy
-from circuittex.study.library.symbols.project import example_project
+from circuittex.study.library.symbols.project import Divider, example_project
 
 SAME = 1e-9
 """Relative: the same numbers through the same program, and a raw file's digits."""
@@ -171,20 +171,42 @@ def test_the_example_project_runs(library: Path) -> None:
     plot = run_deck("\n".join(["* example", *lines, ".end", ""])).plots[-1]
     name = "fabric_ports_stretch_v"
     path = library / "ngspice" / f"{name}.lib"
-    by_hand = {"warp1_minus": "sense", "warp1_plus": "0", "strain": "strain", "out_of_range": "out_of_range"}
+    names, G = resistor_matrix((library / "ngspice" / "fabric_ports.lib").read_text("ascii"))
+    inverse = np.linalg.inv(G[1:, 1:])  # the first pin at ground
+    farthest = names[1 + int(np.argmax(np.diag(inverse)))]
+    by_hand = {"warp1_minus": "sense", farthest: "0", "strain": "strain", "out_of_range": "out_of_range"}
     nodes = " ".join(by_hand.get(pin, f"open_{pin}") for pin in pins_of(path.read_text("ascii")))
     (source,) = [line for line in lines if line.startswith("V2 ")]
     (sine,) = re.findall(r"SIN\((.*)\)", source)
-    own = ["* hand", f".include {path}", "V1 supply 0 3.3", "R1 supply sense 100", f"X1 {nodes} {name}"]
+    ohm = f"{np.diag(inverse).max():.1g}"
+    own = ["* hand", f".include {path}", "V1 supply 0 3.3", f"R1 supply sense {ohm}", f"X1 {nodes} {name}"]
     own += [f"Vs strain 0 SIN({sine})", ".tran 1m 100m", ".end", ""]
     wanted = run_deck("\n".join(own)).plots[-1]
     shown = ["supply", "sense", "strain", "out_of_range"]
     np.testing.assert_allclose(plot.voltage(shown)[-1], wanted.voltage(shown)[-1], rtol=1e-6, atol=1e-9)
     sense, strain = plot.voltage(["sense"])[:, 0], plot.voltage(["strain"])[:, 0]
-    assert 0.0 < sense.min() < sense.max() < 3.3
+    assert 0.0 < sense.min() < 0.9 * sense.max() < 0.9 * 3.3, "a designer sees what strain does"
     assert strain.min() == pytest.approx(0.0, abs=1e-9)
     assert strain.max() > 0.02
     assert abs(plot.voltage(["out_of_range"])).max() < 1e-9
+
+
+@pytest.mark.parametrize("states", [1, 3])
+@pytest.mark.filterwarnings("ignore:the study has one state")
+def test_the_netlist_of_the_example_is_that_of_its_sheet(tmp_path: Path, states: int) -> None:
+    """Line by line but for the names of open pins and the order, as KiCad's own exporter makes it of the sheet."""
+    export_library(study(states), tmp_path, dialects=("ngspice",))
+    folder, sheet = example(tmp_path)
+    title, include, *lines, end = (folder / "fabric_example.cir").read_text("ascii").splitlines()
+    assert title.startswith("* ")
+    assert end == ".end"
+    wanted_include, *wanted = netlist(sheet, folder)
+    assert (folder / include.split()[1]).resolve() == Path(wanted_include.split()[1])
+    is_open = re.compile(r"(?<= )(nc_x1_\d+|X1_\w+)(?= )")
+    given = [word for line in lines for word in is_open.findall(line)]
+    assert len(set(given)) == len(given) > 10
+    lines = [line for line in lines if not line.startswith(".print ")]  # KiCad shows what is asked for on the screen
+    assert sorted(is_open.sub("open", line) for line in lines) == sorted(is_open.sub("open", line) for line in wanted)
 
 
 def test_the_example_of_one_state_runs(tmp_path: Path) -> None:
@@ -211,7 +233,8 @@ def test_the_example_of_a_wide_fabric_joins_nothing_else(tmp_path: Path) -> None
     for path in (folder, tmp_path / "ngspice"):
         path.mkdir(parents=True)
     (tmp_path / wide.file).write_text(f".subckt piece {' '.join(pin.name for pin in wide.pins)}\n.ends piece\n")
-    text = example_project(wide, "D", "fabric.kicad_sym", 0.0, 0.1)["fabric_example.kicad_sch"]
+    shown = replace(SHOWN, ends=("warp0_a", "warp0_b"))
+    text = example_project(wide, "D", "fabric.kicad_sym", shown)["fabric_example.kicad_sch"]
     (folder / "wide.kicad_sch").write_text(text, "utf-8")
     (line,) = [line for line in netlist(Schematic.from_file(str(folder / "wide.kicad_sch")), folder) if line[0] == "X"]
     nets = line.split()[1:-1]
@@ -279,6 +302,7 @@ def parse(text: str) -> list[object]:
 
 
 PINS = (Pin("a", "left", "electrical"), Pin("b", "right", "electrical"), Pin("strain", "bottom", "control"))
+SHOWN = Divider(("a", "b"), "100", 0.0, 0.1)
 EVIL = st.lists(
     st.sampled_from(
         ['"', "\\", ")", "(", '")', '(symbol "b"', "\n", "\r", "\\n", "\0", "\u2028", "${X}", "µ", "\ud800"]
@@ -336,7 +360,7 @@ def test_kiutils_reads_symbols_of_any_text(title: str, design: str) -> None:
 
 
 def sheet(design: str) -> list[object]:
-    files = example_project(cell("T", "ngspice"), design, "fabric.kicad_sym", 0.0, 0.1)
+    files = example_project(cell("T", "ngspice"), design, "fabric.kicad_sym", SHOWN)
     return parse(files["fabric_example.kicad_sch"])
 
 

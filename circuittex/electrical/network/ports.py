@@ -25,6 +25,14 @@ class PortMatrix:
     conductance: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     """(P, P) G, S: rows add up to zero, nothing beside the diagonal is positive."""
 
+    def between(self, a: str, b: str) -> float:
+        """Resistance between two ports, all others open, ohm; inf where nothing joins them.
+
+        >>> round(PortMatrix(("a", "b"), np.array([[0.5, -0.5], [-0.5, 0.5]])).between("a", "b"), 12)
+        2.0
+        """
+        return float(resistances(self)[self.ports.index(a), self.ports.index(b)])
+
 
 def port_matrix(circuit: Circuit, ports: Sequence[str] | None = None) -> PortMatrix:
     """The port matrix of a circuit: the Schur complement of its nodal matrix on its ports.

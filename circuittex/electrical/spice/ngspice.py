@@ -48,6 +48,11 @@ class Plot:
     values: Floats
     """(points, n) in V, A, or the unit of the sweep."""
 
+    @property
+    def sweep(self) -> Floats:
+        """(points,) of what goes from point to point: time, s, or the value of a swept source, V or A."""
+        return np.asarray(self.values[:, 0])
+
     def voltage(self, nodes: Sequence[str]) -> Floats:
         """(points, len(nodes)) voltage of the named nodes, V; node '0' is ground.
 

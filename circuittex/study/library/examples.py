@@ -9,68 +9,70 @@ from circuittex.electrical.network.circuit import Circuit, yarn_end_name
 from circuittex.netlist import Header, deck
 from circuittex.study.library.cell import Cell
 from circuittex.study.library.dialect import DIALECTS
+from circuittex.study.library.instance import instance
 
-OHMMETER = "1 V between the first two pins, all others open; what flows in is minus the current of the source"
+OHMMETER = "1 V between {} and {}, all others open; what flows in is minus the current of the source"
 SINE = {"ltspice": "SINE"}
 """How the source is called where it is not SIN."""
 
 
-def example_deck(cell: Cell, low: float, high: float, floating: Sequence[str] = ()) -> str:
-    """A deck that measures between the first two pins, to stand in a folder beside that of the cell's file.
+def example_deck(cell: Cell, ends: tuple[str, str], low: float, high: float, floating: Sequence[str] = ()) -> str:
+    """A deck that measures between two pins, `ends`, to stand in a folder beside that of the cell's file.
 
     `low` and `high` are the smallest and largest sampled strain; they do not matter where strain is no input.
-    `floating` pins, of parts that nothing joins to the second pin, have a large resistor to ground.
+    `floating` pins, of parts that nothing joins to these, have a large resistor to ground.
     """
     if cell.parameters:
-        return _parameter(cell, low, high, floating)
+        return _parameter(cell, ends, low, high, floating)
     pin = any(pin.kind == "control" for pin in cell.pins)
-    return _pin(cell, low, high, floating) if pin else _resistance(cell, floating)
+    return _pin(cell, ends, low, high, floating) if pin else _resistance(cell, ends, floating)
 
 
-def _resistance(cell: Cell, floating: Sequence[str]) -> str:
+def _resistance(cell: Cell, ends: tuple[str, str], floating: Sequence[str]) -> str:
     # A sweep of one point: gnucap and LTspice print and measure nothing of an operating point.
-    lines = ["V1 in 0 1", _call(cell), *_grounded(cell, floating), ".print dc v(in) i(V1)", ".dc V1 1 1 1"]
-    return _deck(cell, OHMMETER, lines)
+    lines = ["V1 in 0 1", _call(cell, ends), *_grounded(ends, floating), ".print dc v(in) i(V1)", ".dc V1 1 1 1"]
+    return _deck(cell, OHMMETER.format(*ends), lines)
 
 
-def _parameter(cell: Cell, low: float, high: float, floating: Sequence[str]) -> str:
-    what = f"{OHMMETER}; at the lowest strain, amid the range, and beyond it, where the flag is up"
+def _parameter(cell: Cell, ends: tuple[str, str], low: float, high: float, floating: Sequence[str]) -> str:
+    what = f"{OHMMETER.format(*ends)}; at the lowest strain, amid the range, and beyond it, where the flag is up"
     lines = []
     for number, strain in enumerate((low, (low + high) / 2, 2 * high - low), 1):
         given = f" {DIALECTS[cell.dialect].parameters}strain={strain!r}"
-        lines += [f"V{number} in_{number} 0 1", _call(cell, f"_{number}") + given]
-        lines += _grounded(cell, floating, f"_{number}")
+        lines += [f"V{number} in_{number} 0 1", _call(cell, ends, f"_{number}") + given]
+        lines += _grounded(ends, floating, f"_{number}")
     show = "i(V1) i(V2) i(V3) v(out_of_range_1) v(out_of_range_3)"
     return _deck(cell, what, [*lines, f".print dc {show}", ".dc V1 1 1 1"])
 
 
-def _pin(cell: Cell, low: float, high: float, floating: Sequence[str]) -> str:
+def _pin(cell: Cell, ends: tuple[str, str], low: float, high: float, floating: Sequence[str]) -> str:
     sine = f"{SINE.get(cell.dialect, 'SIN')}({(low + high) / 2!r} {(high - low) / 2!r} 100 0 0 -90)"
-    lines = ["V1 in 0 1", f"Vstrain strain 0 {sine}", _call(cell), *_grounded(cell, floating)]
+    lines = ["V1 in 0 1", f"Vstrain strain 0 {sine}", _call(cell, ends), *_grounded(ends, floating)]
     lines.append(".print tran v(strain) i(V1) v(out_of_range)")
     if cell.dialect != "xyce":
         lines.append(".meas tran i_stretched FIND i(V1) AT=5m")
-    return _deck(cell, f"{OHMMETER}; strain breathes once through its range in 10 ms", [*lines, ".tran 20u 10m"])
+    return _deck(
+        cell, f"{OHMMETER.format(*ends)}; strain breathes once through its range in 10 ms", [*lines, ".tran 20u 10m"]
+    )
 
 
 def _deck(cell: Cell, what: str, lines: list[str]) -> str:
     return "\n".join([f"* {cell.name}: {what}", f".include ../{cell.file}", *lines, ".end", ""])
 
 
-def _call(cell: Cell, end: str = "") -> str:
-    """The card of an instance; its nodes are called like the pins, the first one 'in', the second is ground."""
-    return f"X1{end} {' '.join(_node(cell, pin.name, end) for pin in cell.pins)} {cell.name}"
+def _call(cell: Cell, ends: tuple[str, str], end: str = "") -> str:
+    """The card of an instance; its nodes are called like the pins, the first of `ends` 'in', the second is ground."""
+    return instance(cell, f"X1{end}", {pin.name: _node(ends, pin.name, end) for pin in cell.pins})
 
 
-def _node(cell: Cell, pin: str, end: str) -> str:
+def _node(ends: tuple[str, str], pin: str, end: str) -> str:
     """The node of a deck at a pin."""
-    first, second = [pin.name for pin in cell.pins if pin.kind == "electrical"][:2]
-    return {first: f"in{end}", second: "0"}.get(pin, f"{pin}{end}")
+    return {ends[0]: f"in{end}", ends[1]: "0"}.get(pin, f"{pin}{end}")
 
 
-def _grounded(cell: Cell, floating: Sequence[str], end: str = "") -> list[str]:
+def _grounded(ends: tuple[str, str], floating: Sequence[str], end: str = "") -> list[str]:
     """Resistors that keep what floats near ground."""
-    return [f"R{pin}{end} {_node(cell, pin, end)} 0 1e9" for pin in floating]
+    return [f"R{pin}{end} {_node(ends, pin, end)} 0 1e9" for pin in floating]
 
 
 def crimped_probe(design: Design, circuit: Circuit, probe: Probe, state: str) -> str:

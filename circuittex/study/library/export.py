@@ -23,7 +23,7 @@ from circuittex.study.library.datasheet import write_datasheet
 from circuittex.study.library.examples import crimped_probe, example_deck
 from circuittex.study.library.facts import Facts, facts_of
 from circuittex.study.library.levels import CRIMPED, ENDS, FREE, detailed
-from circuittex.study.library.network import Network, floating
+from circuittex.study.library.network import Network, farthest, floating
 from circuittex.study.library.parts import Part, fixed_parts, strained_parts
 from circuittex.study.library.subcircuit import library_text
 from circuittex.study.library.symbols.files import write_symbols
@@ -69,8 +69,7 @@ def export_library(
     networks = {part.name: part.network for part in found}
     _write_examples(folder / "examples", cells, networks)
     _write_probes(folder / "examples", study, chosen)
-    ranges = {each: (float(network.strain[0]), float(network.strain[-1])) for each, network in networks.items()}
-    write_symbols(folder, word, study.design.name, cells, ranges)
+    write_symbols(folder, word, study.design.name, cells, networks)
     write_datasheet(folder, study, known, cells, networks)
     library = {
         "format": FORMAT,
@@ -142,11 +141,13 @@ def _write(folder: Path, study: Study, known: Facts, part: Part, dialect: str, c
 
 def _write_examples(folder: Path, cells: Sequence[Cell], networks: Mapping[str, Network]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
+    ends = {cell.name: farthest(networks[cell.name])[0] for cell in cells if cell.level != "detailed"}
     for cell in cells:
         if cell.level != "detailed":
-            network = networks[cell.name]
+            network, (source, sink) = networks[cell.name], ends[cell.name]
             low, high = network.strain[[0, -1]].tolist()
-            _write_ascii(folder / f"{cell.dialect}_{cell.name}.cir", example_deck(cell, low, high, floating(network)))
+            text = example_deck(cell, (source, sink), low, high, floating(network, sink))
+            _write_ascii(folder / f"{cell.dialect}_{cell.name}.cir", text)
 
 
 def _write_probes(folder: Path, study: Study, chosen: int) -> None:

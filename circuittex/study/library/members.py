@@ -19,13 +19,13 @@ def is_ensemble(folder: Path) -> bool:
     return (folder / MEMBERS).is_dir() and not (folder / RESULTS).exists()
 
 
-def complete_members(folder: Path) -> Iterator[Study]:
-    """The members that have all their states, one at a time, in their order: they are large.
+def complete_members(folder: str | Path) -> Iterator[Study]:
+    """The members of an ensemble that have all their states, one at a time, in their order: they are large.
 
     Raises `StoreError` where there is none.
     """
     found = 0
-    for path in sorted((folder / MEMBERS).glob(f"*/{RESULTS}")):
+    for path in sorted((Path(folder) / MEMBERS).glob(f"*/{RESULTS}")):
         study = load_study(path)
         if len(study.records) == len(plan(study.design)):
             found += 1

@@ -22,6 +22,9 @@ FLOOR = 1e-9
 """What opens in some states of a path and not in others keeps this part of its smallest conductance: the logarithm of
 none has no value between states, and a resistor that reaches none stops a transient."""
 
+ALIKE = 1e-6
+"""Relative: of resistances that differ by less the first is the largest."""
+
 
 @frozen
 class Network:
@@ -102,16 +105,38 @@ def matrix_at(network: Network, conductance: Floats) -> PortMatrix:
     return port_matrix(circuit)
 
 
-def floating(network: Network) -> tuple[str, ...]:
-    """A pin of each part of a network that nothing joins to its second pin.
+def farthest(network: Network) -> tuple[tuple[str, str], float]:
+    """The first pin that anything joins, the one with the largest resistance to it, and that in the first state, ohm.
 
-    >>> floating(Network(("a", "b", "c"), ("a_b",), (("a", "b"),), np.zeros(1), np.ones((1, 1))))
+    Along one yarn a strain may change nothing; the way to another yarn leads through contacts.
+
+    >>> farthest(Network(("a", "b", "c"), ("ab", "bc"), (("a", "b"), ("b", "c")), np.zeros(1), np.full((1, 2), 0.5)))
+    (('a', 'c'), 4.0)
+    """
+    parts = _parts(network)
+    number, source = next((k, pin) for k, pin in enumerate(network.pins) if any({pin} < part for part in parts))
+    (part,) = [part for part in parts if source in part]
+    own = [k for k, pin in enumerate(network.pins) if k != number and pin in part]
+    G = matrix_at(network, network.conductance[0]).conductance[np.ix_(own, own)]
+    ohm = np.linalg.inv(G).diagonal()  # the first pin is at ground
+    k = int(np.argmax(ohm > (1.0 - ALIKE) * ohm.max()))
+    return (source, network.pins[own[k]]), float(ohm[k])
+
+
+def floating(network: Network, ground: str) -> tuple[str, ...]:
+    """A pin of each part of a network that nothing joins to the pin `ground`.
+
+    >>> floating(Network(("a", "b", "c"), ("a_b",), (("a", "b"),), np.zeros(1), np.ones((1, 1))), "a")
     ('c',)
     """
+    return tuple(min(part) for part in _parts(network) if part and ground not in part)
+
+
+def _parts(network: Network) -> list[set[str]]:
+    """The pins of each part that hangs together."""
     graph = nx.Graph(network.nodes)
     graph.add_nodes_from(network.pins)
-    parts = [part.intersection(network.pins) for part in nx.connected_components(graph)]
-    return tuple(min(part) for part in parts if part and network.pins[1] not in part)
+    return [part.intersection(network.pins) for part in nx.connected_components(graph)]
 
 
 def _positive(siemens: Floats) -> Floats:

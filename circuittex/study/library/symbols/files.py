@@ -7,24 +7,23 @@ from pathlib import Path
 
 from circuittex.base.atomic import write_text
 from circuittex.study.library.cell import Cell
+from circuittex.study.library.network import Network
 from circuittex.study.library.symbols.kicad import symbol_library
 from circuittex.study.library.symbols.ltspice import asy
-from circuittex.study.library.symbols.project import example_project
+from circuittex.study.library.symbols.project import divider, example_project
 
 
-def write_symbols(
-    folder: Path, name: str, design: str, cells: Sequence[Cell], ranges: Mapping[str, tuple[float, float]]
-) -> None:
+def write_symbols(folder: Path, name: str, design: str, cells: Sequence[Cell], networks: Mapping[str, Network]) -> None:
     """Write `kicad/NAME.kicad_sym` with an example project, and an `.asy` beside each file for LTspice.
 
-    `ranges`: smallest and largest strain of each cell. What a library has no files for gets no symbols.
+    `networks`: what is between the pins of each cell, by its name. What a library has no files for gets no symbols.
     """
     run = [cell for cell in cells if cell.dialect == "ngspice"]
     files = {f"ltspice/{cell.name}.asy": asy(cell) for cell in cells if cell.dialect == "ltspice"}
     if run:
         files[f"kicad/{name}.kicad_sym"] = symbol_library(run, design)
         shown = shown_cell(run)
-        project = example_project(shown, design, f"{name}.kicad_sym", *ranges[shown.name])
+        project = example_project(shown, design, f"{name}.kicad_sym", divider(networks[shown.name]))
         files |= {f"kicad/example/{file}": text for file, text in project.items()}
     for file, text in files.items():
         path = folder / file

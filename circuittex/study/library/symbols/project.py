@@ -6,8 +6,12 @@ import json
 import uuid
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from circuittex.base.frozen import frozen
 from circuittex.study.library.cell import Cell
+from circuittex.study.library.instance import instance
+from circuittex.study.library.network import Network, farthest
 from circuittex.study.library.symbols.expression import Text, write
 from circuittex.study.library.symbols.kicad import (
     PITCH,
@@ -27,7 +31,9 @@ VERSION = 20230121
 """Of the format of schematics: that of KiCad 7."""
 LIBRARY = "../../"
 """The library's folder, seen from the project's."""
-SUPPLY, OHM = "3.3", "100"
+SUPPLY = "3.3"
+DIRECTIVES = {True: ".tran 1m 100m", False: ".op"}
+"""What is simulated where strain is a pin, and where it is no input."""
 LEFT, TOP = 16, 30
 """Where the sources and the resistor are, in units of the grid of the sheet."""
 
@@ -50,16 +56,42 @@ class Item:
     """How many."""
 
 
-def example_project(cell: Cell, design: str, symbols: str, low: float, high: float) -> dict[str, str]:
+@frozen
+class Divider:
+    """What the project shows: a supply, a resistor, and the fabric from its first pin to another."""
+
+    ends: tuple[str, str]
+    """The pins of the fabric at the resistor and at ground."""
+    ohm: str
+    """The resistor."""
+    low: float
+    """The smallest strain."""
+    high: float
+    """The largest."""
+
+
+def divider(network: Network) -> Divider:
+    """The fabric between two pins far apart, and a resistor like it.
+
+    >>> network = Network(("a", "b", "c"), ("a_b", "b_c"), (("a", "b"), ("b", "c")), np.zeros(1), np.full((1, 2), 0.1))
+    >>> divider(network)
+    Divider(ends=('a', 'c'), ohm='20', low=0.0, high=0.0)
+    """
+    ends, ohm = farthest(network)
+    value = np.format_float_positional(float(f"{ohm:.1g}"), trim="-")
+    return Divider(ends, value, float(network.strain[0]), float(network.strain[-1]))
+
+
+def example_project(cell: Cell, design: str, symbols: str, shown: Divider) -> dict[str, str]:
     """Texts of the project by the names of files; `symbols` is the name of the `.kicad_sym` in the folder above.
 
-    Strain goes once from `low` to `high` and back where it is a pin.
+    Strain goes through its range and back where it is a pin. The `.cir` is the netlist of the sheet, for ngspice alone.
 
     >>> from circuittex.study.library.cell import Pin
     >>> pins = (Pin("a", "left", "electrical"), Pin("b", "right", "electrical"))
     >>> piece = Cell("piece", "ports", "a piece", pins, (), "ngspice/piece.lib", "ngspice")
-    >>> sorted(example_project(piece, "weave", "fabric.kicad_sym", 0.0, 0.0))
-    ['fabric_example.kicad_pro', 'fabric_example.kicad_sch', 'sym-lib-table']
+    >>> sorted(example_project(piece, "weave", "fabric.kicad_sym", Divider(("a", "b"), "100", 0.0, 0.0)))
+    ['fabric_example.cir', 'fabric_example.kicad_pro', 'fabric_example.kicad_sch', 'sym-lib-table']
     """
     project = {"meta": {"filename": f"{NAME}.kicad_pro", "version": 1}, "sheets": [[_id("sheet"), ""]]}
     nickname = symbols.rpartition(".")[0]
@@ -68,23 +100,47 @@ def example_project(cell: Cell, design: str, symbols: str, low: float, high: flo
     table = ["sym_lib_table", ["version", 7], [*row, ["options", Text("")], ["descr", Text("circuittex")]]]
     return {
         f"{NAME}.kicad_pro": json.dumps(project, indent=2) + "\n",
-        f"{NAME}.kicad_sch": write(_sheet(cell, design, nickname, low, high)) + "\n",
+        f"{NAME}.kicad_sch": write(_sheet(cell, design, nickname, shown)) + "\n",
+        f"{NAME}.cir": _netlist(cell, shown),
         "sym-lib-table": write(table) + "\n",
     }
 
 
-def _sheet(cell: Cell, design: str, nickname: str, low: float, high: float) -> Expression:
-    strained = any(each.kind == "control" for each in cell.pins)
+def _strained(cell: Cell) -> bool:
+    return any(each.kind == "control" for each in cell.pins)
+
+
+def _netlist(cell: Cell, shown: Divider) -> str:
+    """The sheet as a netlist, by the rules of KiCad: reference, nodes in the order of the file, name, parameters."""
+    nets = dict(zip(shown.ends, ("sense", "0"), strict=True))
+    nets |= {pin.name: pin.name for pin in cell.pins if pin.kind != "electrical"}
+    lines = [f"* {NAME}: the netlist of {NAME}.kicad_sch", f".include {LIBRARY}{cell.file}", instance(cell, "X1", nets)]
+    lines += [f"V1 supply 0 DC {SUPPLY}", f"R1 supply sense {shown.ohm}"]
+    if _strained(cell):
+        dc, amplitude = _sine(shown)
+        lines.append(f"V2 strain 0 SIN( {dc!r} {amplitude!r} 10 0 0 -90 )")
+        lines.append(".print tran v(strain) v(sense) v(out_of_range)")
+    return "\n".join([*lines, DIRECTIVES[_strained(cell)], ".end", ""])
+
+
+def _sine(shown: Divider) -> tuple[float, float]:
+    """Middle and amplitude of the strain."""
+    return (shown.low + shown.high) / 2, (shown.high - shown.low) / 2
+
+
+def _sheet(cell: Cell, design: str, nickname: str, shown: Divider) -> Expression:
+    strained = _strained(cell)
     fabric = Item(f"{nickname}:{cell.name}", "X1", _place(cell), fields_of(cell, design, LIBRARY), len(cell.pins))
     items = [
         fabric,
         _source("V1", _grid(LEFT, TOP), "DC", f"dc={SUPPLY}"),
-        Item("Device:R", "R1", _grid(LEFT + 6, TOP - 0.5), {"Reference": "R", "Value": OHM}, 2),
+        Item("Device:R", "R1", _grid(LEFT + 6, TOP - 0.5), {"Reference": "R", "Value": shown.ohm}, 2),
     ]
     if strained:
-        sine = f"dc={(low + high) / 2!r} ampl={(high - low) / 2!r} f=10 td=0 theta=0 phase=-90"
+        dc, amplitude = _sine(shown)
+        sine = f"dc={dc!r} ampl={amplitude!r} f=10 td=0 theta=0 phase=-90"
         items.append(_source("V2", _grid(LEFT, TOP + 12), "SIN", sine))
-    marks = list(_marks(cell, strained))
+    marks = list(_marks(cell, shown.ends))
     grounds = [at for name, at in marks if name == "0"]
     items += [
         Item("power:GND", f"#PWR0{k}", at, {"Reference": "#PWR", "Value": "GND"}, 1) for k, at in enumerate(grounds, 1)
@@ -98,33 +154,31 @@ def _sheet(cell: Cell, design: str, nickname: str, low: float, high: float) -> E
         ["uuid", _id("sheet")],
         ["paper", Text("A3")],
     ]
-    directive = ".tran 1m 100m" if strained else ".op"
     return [
         *head,
         title,
         ["lib_symbols", *drawn],
         *(_mark(name, at) for name, at in marks if name != "0"),
         *_wires(),
-        ["text", Text(directive), ["at", *_grid(LEFT, TOP - 8), 0], _font(), ["uuid", _id("directive")]],
+        ["text", Text(DIRECTIVES[strained]), ["at", *_grid(LEFT, TOP - 8), 0], _font(), ["uuid", _id("directive")]],
         *(_placed(item) for item in items),
         ["sheet_instances", ["path", Text("/"), ["page", Text("1")]]],
     ]
 
 
-def _marks(cell: Cell, strained: bool) -> Iterator[tuple[str, Point]]:
+def _marks(cell: Cell, ends: tuple[str, str]) -> Iterator[tuple[str, Point]]:
     """Nets by name and place: '0' is ground and '' no connection."""
     found = layout(cell)
-    electrical = [place.number for place in found.places if place.pin.kind == "electrical"]
-    nets = {electrical[0]: "sense", electrical[1]: "0"}
+    nets = dict(zip(ends, ("sense", "0"), strict=True))
     for place in found.places:
         x, y = position(found, place.x, place.y)
         at = _place(cell)
-        net = nets.get(place.number, "" if place.pin.kind == "electrical" else place.pin.name)
+        net = nets.get(place.pin.name, "" if place.pin.kind == "electrical" else place.pin.name)
         yield net, (round(at[0] + x, 4), round(at[1] - y, 4))
     yield "supply", _grid(LEFT + 3, TOP - 2)
     yield "sense", _grid(LEFT + 10, TOP + 1)
     yield "0", _grid(LEFT, TOP + 2)
-    if strained:
+    if _strained(cell):
         yield "strain", _grid(LEFT, TOP + 10)
         yield "0", _grid(LEFT, TOP + 14)
 

@@ -15,7 +15,8 @@ from circuittex.electrical.network.circuit import reached_part, reduced_circuit
 from circuittex.electrical.network.nodal import solve_nodal
 from circuittex.electrical.network.ports import port_matrix
 from circuittex.electrical.spice.ngspice import run_deck
-from circuittex.netlist import parse
+from circuittex.netlist import parse, pin_names
+from circuittex.solvers import laplacian
 from circuittex.study.panel.cells import CellResistances
 from circuittex.study.panel.circuit import panel_circuit, panel_netlists, ports_circuit
 from circuittex.study.panel.gradient import panel_gradient
@@ -372,6 +373,27 @@ def test_the_netlist_of_the_reduction_has_the_same_pins_and_name() -> None:
     np.testing.assert_array_equal(np.sort(again.resistance), np.sort(found.wiring.resistance))
 
 
+def test_electrodes_called_like_ground_or_a_quantity_are_ordinary_nodes() -> None:
+    """ngspice would join 'gnd' to node 0, and take 'time' in an expression for the time; here 'gnd' is at 2 V."""
+    ends = (
+        Electrode("gnd", edge="left", voltage=2.0),
+        Electrode("time", edge="right", voltage=-1.0),
+        *(Electrode(name, ends=(f"weft{k + 1}+",)) for k, name in enumerate(("temp", "TEMPER", "hertz", "ground"))),
+        Electrode("n_time", ends=("weft5-",)),  # what 'time' is called instead
+    )
+    found = solve_panel(panel((4, 6), cells(0.28, [3.0]), electrodes=ends))
+    netlists = panel_netlists(found)
+    pins = pin_names(panel_circuit(found.wiring))
+    assert len(set(pins)) == len(ends)
+    assert not {"gnd", "ground", "time", "temp", "temper", "hertz", "0"} & set(pins)
+    for text in (netlists.whole, netlists.ports):
+        assert f".subckt panel_panel {' '.join(pins)}\n" in text
+    sources = netlists.deck[netlists.deck.index("Xpanel") :]
+    for text in (netlists.whole, netlists.ports):
+        (plot,) = run_deck("* panel\n" + text + sources).plots
+        np.testing.assert_allclose(plot.voltage(pins)[0], found.voltage, rtol=SOLVED, atol=SOLVED)
+
+
 # What is left out
 
 
@@ -431,6 +453,29 @@ def test_multigrid_agrees_with_the_factorisation() -> None:
     assert multigrid.residual < 1e-10
     np.testing.assert_allclose(multigrid.ports.conductance, direct.ports.conductance, rtol=SOLVED)
     np.testing.assert_allclose(multigrid.warp_voltage, direct.warp_voltage, rtol=SOLVED)
+
+
+def test_64_electrodes_beyond_a_factorisation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where no factor fits, multigrid solves for every electrode: the reduction is as exact, symmetric and passive."""
+    n, group = 48, 3
+    ends = tuple(
+        Electrode(f"{way}{side}{k}", ends=(f"{way}{k * group + 1}..{(k + 1) * group}{sign}",))
+        for way in ("warp", "weft")
+        for side, sign in (("a", "-"), ("b", "+"))
+        for k in range(n // group)
+    )
+    one = panel((n, n), cuts=(Cut(line=((10, 5), (30, 40))),), electrodes=ends)
+    exact = solve_panel(one, "direct").ports.conductance
+    monkeypatch.setattr(laplacian, "LARGEST_DIRECT", 1000)
+    found = solve_panel(one)
+    conductance = found.ports.conductance
+    assert (found.method, conductance.shape) == ("multigrid", (64, 64))
+    assert found.residual < laplacian.TOLERANCE
+    np.testing.assert_array_equal(conductance, conductance.T)
+    assert conductance[~np.eye(64, dtype=bool)].max() <= 0.0
+    size = np.diag(conductance).max()
+    np.testing.assert_allclose(conductance.sum(axis=1), 0.0, atol=EXACT * size)
+    np.testing.assert_allclose(conductance, exact, rtol=0.0, atol=SOLVED * size)
 
 
 def test_a_panel_in_which_nothing_flows_is_not_refused() -> None:

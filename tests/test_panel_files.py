@@ -11,6 +11,7 @@ from typing import Any
 import matplotlib.image
 import numpy as np
 import pytest
+from PIL import Image
 from synthetic_study import synthetic_study
 
 from circuittex.base.errors import CircuitError, CircuittexError, DesignError
@@ -226,6 +227,13 @@ def test_strain_from_an_image(tmp_path: Path) -> None:
     np.testing.assert_allclose(found, np.tile(0.1 * (1.0 - y)[:, None] * 12 / 11 - 0.1 / 22, (1, 8)), atol=0.1 / 255)
     one = read_image(tmp_path / "map.png", (1, 1), 0.0, 1.0, "strain")
     assert one[0, 0] == pytest.approx(0.5, abs=1 / 255)
+
+
+def test_an_image_of_16_bits_is_as_bright(tmp_path: Path) -> None:
+    """The white of a TIFF of 16 bits is 65535, not 255."""
+    Image.fromarray(np.array([[65535, 32768], [0, 16384]], dtype=np.uint16)).save(tmp_path / "map.tiff")
+    found = read_image(tmp_path / "map.tiff", (2, 2), 0.0, 1.0, "strain")
+    np.testing.assert_allclose(found, [[0.0, 0.25], [1.0, 0.5]], atol=1 / 65535)
 
 
 @pytest.mark.parametrize(

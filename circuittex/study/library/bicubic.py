@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from circuittex.base.arrays import Floats
+from circuittex.base.arrays import Floats, Ints
 from circuittex.base.frozen import frozen
 
 HERMITE = np.array([[1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 1 / 3, 0.0], [0.0, 1.0, 0.0, -1 / 3], [0.0, 1.0, 0.0, 0.0]])
@@ -83,7 +83,7 @@ def left_out(first: Floats, second: Floats, conductance: Floats, i: int, j: int)
     return value_at(rest, float(first[i]), float(second[j]))
 
 
-def _others(count: int, k: int) -> Floats:
+def _others(count: int, k: int) -> Ints:
     """Numbers below `count`, without `k` where it is an inner one."""
     numbers = np.arange(count)
     return numbers if k in (0, count - 1) else numbers[numbers != k]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+import subprocess
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
@@ -36,12 +38,16 @@ BETWEEN = 1e-9
 """Relative: the same polynomials by ngspice."""
 PAIRS = [("warp1_minus", "warp1_plus"), ("warp1_minus", "weft2_plus"), ("warp4_plus", "warp2_minus")]
 NAME = "fabric_ports_stretch_x_shear"
+GNUCAP = shutil.which("gnucap")
+GNUCAP_SUFFIX = {"K": 1e3, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
+GNUCAP_SOURCE = 1e-4
+"""V: gnucap's sources have a small resistance of their own."""
 
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("library")
-    export_library(STUDY, folder, dialects=("ngspice",), combine=("shear", "stretch_x"))
+    export_library(STUDY, folder, dialects=("ngspice", "gnucap"), combine=("shear", "stretch_x"))
     return folder / "ngspice"
 
 
@@ -122,6 +128,38 @@ def test_a_transient_that_throws_both_strains_about_is_solved(library: Path) -> 
     found = run_deck("\n".join([*deck, ".tran 50u 5m", ".end"]) + "\n").plots[-1].voltage(["in"])[:, 0]
     assert found.min() > 0.0
     assert found[0] == pytest.approx(state_at(0.0, 0.0)[0], rel=SAMPLED)
+
+
+def _number(word: str) -> float:
+    """A number as gnucap prints it: 4.7K."""
+    return float(word[:-1]) * GNUCAP_SUFFIX[word[-1]] if word[-1] in GNUCAP_SUFFIX else float(word)
+
+
+@pytest.mark.skipif(GNUCAP is None, reason="gnucap is not installed; `.ci/setup gnucap` does it")
+def test_gnucap_answers_as_each_state_and_beyond(library: Path, tmp_path: Path) -> None:
+    """Strain as a parameter, one and two; gnucap prints twelve digits where it is told to."""
+    cases = [(f"{NAME}_s", f"stretch_x={x} shear={shear}", (x, shear)) for x in X for shear in SHEAR]
+    cases += [("fabric_ports_pull_x_s", f"strain={x}", (x, 0.0)) for x in X]
+    cases += [
+        (f"{NAME}_s", "stretch_x=0.07 shear=-1", (0.06, -0.04)),
+        ("fabric_ports_pull_x_s", "strain=-9", (0.0, 0.0)),
+    ]
+    folder = library.parent / "gnucap"
+    lines = ["* states", ".options numdgt=12 gmin=0"]
+    lines += [f".include {folder}/{name}.lib" for name in dict.fromkeys(name for name, *_ in cases)]
+    for k, (name, words, _) in enumerate(cases):
+        nodes = {PAIRS[1][0]: f"in{k}", PAIRS[1][1]: "0", "out_of_range": f"flag{k}"}
+        pins = pins_of((folder / f"{name}.lib").read_text("ascii"))
+        lines += [f"X{k} {' '.join(nodes.get(pin, f'{pin}_{k}') for pin in pins)} {name} {words}", f"I{k} 0 in{k} 1"]
+    shown = " ".join(f"v({node}{k})" for node in ("in", "flag") for k in range(len(cases)))
+    (tmp_path / "states.cir").write_text("\n".join([*lines, f".print dc {shown}", ".dc I0 1 1 1", ".end", ""]), "ascii")
+    done = subprocess.run(
+        [str(GNUCAP), "-b", "states.cir"], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True
+    )
+    _, *values = (_number(word) for word in done.stdout.strip().splitlines()[-1].split())
+    np.testing.assert_allclose(values[: len(cases)], [state_at(*state)[1] for *_, state in cases], rtol=SAMPLED)
+    beyond = [float(k >= len(cases) - 2) for k in range(len(cases))]
+    np.testing.assert_allclose(values[len(cases) :], beyond, atol=GNUCAP_SOURCE)
 
 
 def test_a_library_says_what_two_strains_err(library: Path) -> None:

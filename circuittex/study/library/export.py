@@ -20,6 +20,7 @@ from circuittex.study.export import probe_netlist, simplified
 from circuittex.study.library.accuracy import Errors
 from circuittex.study.library.cell import DIALECTS, Cell
 from circuittex.study.library.datasheet import write_datasheet
+from circuittex.study.library.dialect import DIALECTS as SYNTAX
 from circuittex.study.library.examples import crimped_probe, example_deck
 from circuittex.study.library.facts import Facts, facts_of
 from circuittex.study.library.grid_parts import grid_parts
@@ -68,7 +69,7 @@ def export_library(
         _write(folder, study, known, part, dialect, chosen)
         for dialect in dialects
         for part in found
-        if dialect != "gnucap" or not part.path
+        if SYNTAX[dialect].expression or not any(pin.kind == "control" for pin in part.pins)
     ]
     networks = {part.name: part.network for part in found}
     _write_examples(folder / "examples", cells, networks)

@@ -41,9 +41,9 @@ def with_both(made: Study) -> Study:
     return replace(made, design=design, records=(*made.records, last))
 
 
-def grid_study() -> Study:
+def grid_study(contacts: int = 120) -> Study:
     """States at three stretches times three shears, with contacts that have nothing to do with one another."""
-    made = synthetic_study(5, contacts=120, rows=(1, 1), loadings=("stretch", "shear"))
+    made = synthetic_study(5, contacts=contacts, rows=(1, 1), loadings=("stretch", "shear"))
     design = replace(made.design, loading=strain_grid("pull", "x", (0.025, 0.06), "shear", (-0.01, -0.04)))
     records = [
         replace(record, name=step.name, loading=step.loading, strain=step.strain, gradient=step.after)

@@ -276,6 +276,18 @@ def test_a_conductance_stays_between_the_four_states_around_it(
         np.testing.assert_allclose(value_at(found, float(line), b), value(pieces(second, g[k]), b), rtol=1e-9)
 
 
+def test_a_patch_that_would_go_beyond_its_corners_is_held() -> None:
+    """Uneven strains and logarithms in natural units for which the bicubic of slopes and twists leaves by 0.7."""
+    first, second = np.array([0.1, 0.2, 1.2, 2.2]), np.array([5.0, 5.1, 10.1, 10.2])
+    logs = [[1.1, 2.0, -10.0, 0.0], [10.0, 10.0, 0.0, -10.0], [1.0, 10.0, 10.0, 10.0], [0.0, 2.0, 1.0, 1.1]]
+    found = patches(first, second, np.exp(logs)[..., None])
+    inside = [
+        float(np.log(value_at(found, a, b)[0])) for a in np.linspace(0.2, 1.2, 21) for b in np.linspace(5.1, 10.1, 21)
+    ]
+    assert min(inside) >= 0.0 - 1e-9
+    assert max(inside) <= 10.0 + 1e-9
+
+
 def test_a_bilinear_logarithm_is_interpolated_exactly_and_held_beyond() -> None:
     """log g = 1 + 2 a - 3 b + 40 a b on uneven strains: slopes and twists are those of the function."""
     first, second = np.array([-0.1, 0.0, 0.07, 0.25]), np.array([0.0, 0.1, 0.15])

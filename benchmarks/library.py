@@ -4,9 +4,9 @@
 
 RESULTS is the folder of a study. Errors are those over all pairs of pins and all states, and those of the interpolation
 at each inner state where it is found from all others. The largest difference of `ports` from `detailed` in ngspice is
-that over all pairs of pins in the first N states (default: all). A transient has 10 ms; strain is a pin where a name
-ends in _v. With --contacts the errors of the cell are found again with contacts 100 to 1e5 times as conductive (takes
-minutes).
+that over all pairs of pins in the first N states (default: all). A transient has 10 ms; strain is a parameter where a
+name ends in _s and a pin where it ends in _v. With --contacts the errors of all levels are found with a sigma_c that is
+1 to 1e5 times the study's, in the same mechanical states; `detailed` is then solved by a sparse LU (takes minutes).
 """
 
 from __future__ import annotations
@@ -14,16 +14,19 @@ from __future__ import annotations
 import subprocess
 import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import scipy.sparse as sp
 from measure import Table, arguments, publish
+from scipy.sparse.linalg import splu
 
 from circuittex.base.arrays import Floats
-from circuittex.electrical.network.circuit import reduced_circuit
-from circuittex.electrical.network.matching import groups, match_pairs, spread
-from circuittex.electrical.network.ports import port_matrix
+from circuittex.contact.extract import contacts_of
+from circuittex.electrical.network.circuit import Circuit
+from circuittex.electrical.network.ports import PortMatrix, port_matrix
 from circuittex.electrical.spice.ngspice import find_ngspice
 from circuittex.results.records import Study
 from circuittex.results.store import load_study
@@ -36,8 +39,10 @@ from circuittex.study.library.network import Network, circuit_network, ports_net
 from circuittex.study.library.parts import pins
 from circuittex.study.library.subcircuit import library_text
 
-CONTACTS = (1e2, 1e3, 1e4, 1e5)
-"""How many times as conductive."""
+CONTACTS = (1.0, 1e2, 1e3, 1e4, 1e5)
+"""How many times the study's sigma_c."""
+THIN = 0.001
+"""Error of the thinned ports."""
 HEAD = ["level", "resistance, worst", "median", "change, worst", "median"]
 TIMED = ("fabric_detailed", "fabric_ports", "fabric_ports_thin", "fabric_cell")
 
@@ -51,20 +56,48 @@ def errors(study: Study) -> Table:
 
 
 def contacts(study: Study) -> Table:
-    """Errors of the cell where all contacts conduct better."""
-    names = levels(study, CRIMPED).pins
-    grouping, shape = groups(study.design, each_crossing=True), np.shape(study.design.weave.draft)
+    """Errors of every level against the detailed network where only sigma_c differs, and which one is recommended."""
     rows = []
     for factor in CONTACTS:
-        exact, found = [], []
-        for record in study.records:
-            state = replace(record.contacts, conductance=factor * record.contacts.conductance)
-            circuit = detailed(study.design, replace(record, contacts=state), CRIMPED)
-            exact.append(port_matrix(circuit, names))
-            match = match_pairs(study.design, grouping, exact[-1])
-            found.append(port_matrix(reduced_circuit((shape[0], shape[1]), *spread(grouping, match.found)), names))
-        rows.append(_row(f"cell, contacts times {factor:.0e}", compared(exact, found)))
-    return Table("Errors (%) of the cell with better contacts:", HEAD, rows)
+        other = with_sigma_c(study, factor)
+        known = facts_of(other, CRIMPED, THIN, 10.0, ())
+        whole = [lu_reduction(detailed(other.design, record, CRIMPED), known.levels.pins) for record in other.records]
+        found = {"ports": known.levels.ports, "ports_thin": known.reductions[1].ports}
+        if not known.levels.reason:
+            found["cell"] = [port_matrix(circuit, known.levels.pins) for circuit in known.levels.cells]
+        for level, matrices in found.items():
+            chosen = "recommended" if level == known.recommended else ""
+            rows.append([f"{factor:.0e}", *_row(level, compared(whole, matrices)), chosen])
+    return Table("Errors (%) of the levels where sigma_c is that many times the study's:", ["times", *HEAD, ""], rows)
+
+
+def with_sigma_c(study: Study, factor: float) -> Study:
+    """The study with another contact conductivity in the same mechanical states, which do not know it."""
+    law = replace(study.design.contact, conductivity=factor * study.design.contact.conductivity)
+    design = replace(study.design, contact=law)
+    records = [
+        replace(record, contacts=contacts_of(design, study.mesh, record.configuration), ports=PortMatrix())
+        for record in study.records
+    ]
+    return replace(study, design=design, records=tuple(records))
+
+
+def lu_reduction(circuit: Circuit, pins: Sequence[str]) -> PortMatrix:
+    """The port matrix from resistances between pins by a sparse LU of the nodal matrix, the first pin grounded."""
+    a, b = circuit.resistor_nodes.T
+    K = len(circuit.node_names)
+    g = np.tile(1.0 / circuit.resistance, 2)
+    W = sp.csc_matrix((g, (np.append(a, b), np.append(b, a))), shape=(K, K))
+    place = dict(zip(circuit.ports, circuit.port_node.tolist(), strict=True))
+    nodes = [place[name] for name in pins]
+    others = np.delete(np.arange(K), nodes[0])
+    nodal = (sp.diags(np.asarray(W.sum(axis=1)).ravel()) - W).tocsc()[others][:, others]
+    row = np.searchsorted(others, nodes[1:])
+    amperes = np.zeros((K - 1, len(row)))
+    amperes[row, np.arange(len(row))] = 1.0
+    inner = np.linalg.inv(splu(nodal.tocsc()).solve(amperes)[row])
+    G = np.block([[inner.sum(keepdims=True), -inner.sum(axis=0, keepdims=True)], [-inner.sum(axis=1)[:, None], inner]])
+    return PortMatrix(tuple(pins), (G + G.T) / 2.0)
 
 
 def difference(study: Study, states: int) -> Table:
@@ -82,8 +115,8 @@ def transients(study: Study) -> Table:
     """Seconds of ngspice for 10 ms in steps of at most 10 us, and how many times faster than the detailed network."""
     rows = []
     with tempfile.TemporaryDirectory() as name:
-        cells = export_library(study, name, dialects=("ngspice",), thin=0.001)
-        driven = [cell for cell in cells if cell.name in TIMED or cell.name.endswith("_v")]
+        cells = export_library(study, name, dialects=("ngspice",), thin=THIN)
+        driven = [cell for cell in cells if cell.name in TIMED or cell.name.endswith(("_v", "_s"))]
         for cell in sorted(driven, key=lambda cell: cell.level != "detailed"):
             seconds = _seconds(Path(name), cell)
             rows.append([cell.name, seconds, (rows[0][1] if rows else seconds) / seconds])
@@ -94,8 +127,8 @@ def _seconds(folder: Path, cell: Cell) -> float:
     first, second = [pin.name for pin in cell.pins if pin.kind == "electrical"][:2]
     nodes = " ".join({first: "in", second: "0"}.get(pin.name, pin.name) for pin in cell.pins)
     lines = [f"* {cell.name}", f".include {cell.file}", f"X1 {nodes} {cell.name}", "V1 in 0 SIN(1 0.1 1k)"]
-    if any(pin.kind == "control" for pin in cell.pins):
-        lines.append("V2 strain 0 SIN(0.1 0.1 100)")
+    for k, pin in enumerate(pin for pin in cell.pins if pin.kind == "control"):
+        lines.append(f"Vstrain{k} {pin.name} 0 SIN(0.1 0.1 100)")
     (folder / "t.cir").write_text("\n".join([*lines, ".tran 10u 10m", ".end", ""]), encoding="ascii")
     start = time.perf_counter()
     command = [str(find_ngspice()), "-n", "-b", "-r", "t.raw", "t.cir"]

@@ -12,7 +12,7 @@ _HOMES = {
     "design": (
         *("ContactLaw", "Design", "Electrical", "Loading", "Material", "MaterialPair", "Numerics", "Packing"),
         *("Probe", "Terminal", "Weave", "Yarn", "biaxial", "design_hash", "equal_steps", "load_design", "load_unload"),
-        *("parse_design", "plain_weave", "shear", "starter", "uniaxial"),
+        *("parse_design", "plain_weave", "shear", "starter", "strain_grid", "uniaxial"),
     ),
     "geometry.weave": ("build_mesh",),
     "mech.configuration": ("initial_configuration",),
@@ -80,6 +80,7 @@ if TYPE_CHECKING:
     from circuittex.design import plain_weave as plain_weave
     from circuittex.design import shear as shear
     from circuittex.design import starter as starter
+    from circuittex.design import strain_grid as strain_grid
     from circuittex.design import uniaxial as uniaxial
     from circuittex.electrical.fields import solve_fields as solve_fields
     from circuittex.electrical.network.circuit import Circuit as Circuit

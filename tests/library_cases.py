@@ -11,6 +11,7 @@ import numpy as np
 from synthetic_study import synthetic_study
 
 from circuittex.base.arrays import Floats
+from circuittex.design import Loading, strain_grid
 from circuittex.electrical.spice.ngspice import run_deck
 from circuittex.results.records import Study
 from circuittex.study.plan import plan
@@ -26,6 +27,29 @@ def study(states: int = 4) -> Study:
     steps = plan(made.design)
     records = [replace(record, name=step.name) for step, record in zip(steps, made.records, strict=True)]
     return replace(made, records=tuple(records))
+
+
+def with_both(made: Study) -> Study:
+    """The study with a state of stretch and shear at once, that of the smallest grid of both."""
+    stretch, record = made.design.loading[0], made.records[1]
+    start = stretch.gradients[0]
+    gradient = (start[0], (0.025, 1.0))
+    both = Loading("both", (gradient,), (0.025,), start=start)
+    design = replace(made.design, loading=(*made.design.loading, both))
+    half = replace(record.contacts, conductance=record.contacts.conductance * 0.5)
+    last = replace(record, name="both-0.025", loading="both", gradient=np.array(gradient), contacts=half)
+    return replace(made, design=design, records=(*made.records, last))
+
+
+def grid_study(contacts: int = 120) -> Study:
+    """States at three stretches times three shears, with contacts that have nothing to do with one another."""
+    made = synthetic_study(5, contacts=contacts, rows=(1, 1), loadings=("stretch", "shear"))
+    design = replace(made.design, loading=strain_grid("pull", "x", (0.025, 0.06), "shear", (-0.01, -0.04)))
+    records = [
+        replace(record, name=step.name, loading=step.loading, strain=step.strain, gradient=step.after)
+        for step, record in zip(plan(design), made.records, strict=True)
+    ]
+    return replace(made, design=design, records=tuple(records))
 
 
 def pins_of(text: str) -> list[str]:

@@ -136,8 +136,21 @@ def test_library_measures_every_level() -> None:
     assert state == "relaxed"
     assert difference < 1e-9
     rows = library.transients(study).rows
-    assert len(rows) == 4 + 2 * 4
+    assert len(rows) == 4 + 2 * 2 * 4, "four fixed levels, and two loadings of four with strain as parameter and as pin"
     assert rows[0][0] == "fabric_detailed"
+
+
+def test_library_gives_every_conductivity_of_contacts_its_errors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A made-up state whose contacts lie on the fibrils as a search finds them is not needed: they are scaled."""
+    library = script("library")
+    study = cases.study(2)
+    monkeypatch.setattr(library, "CONTACTS", (1.0, 1e3))
+    monkeypatch.setattr(library, "contacts_of", lambda design, mesh, configuration: study.records[0].contacts)
+    rows = library.contacts(study).rows
+    assert {row[0] for row in rows} == {"1e+00", "1e+03"}
+    ports = [row for row in rows if row[1] == "ports"]
+    assert all(row[2] < 1e-6 for row in ports), "in %, an exact reduction against a sparse LU"
+    assert [row[-1] for row in rows].count("recommended") == 2
 
 
 def test_ready_words_are_the_cards_of_the_deck() -> None:

@@ -19,7 +19,7 @@ from test_stored_errors import made_up
 from test_summary import disagreeing, unchecked
 
 import circuittex
-from circuittex.design import Packing, Terminal, uniaxial
+from circuittex.design import Packing, Terminal, strain_grid, uniaxial
 from circuittex.results.claims import CLAIMS
 from circuittex.results.plot import FIGURES
 from circuittex.results.records import Study
@@ -143,10 +143,14 @@ def test_findings_that_differ_are_followed_by_the_reason() -> None:
 
 
 def test_loading_paths_are_stated() -> None:
-    loading = (uniaxial("strip", (0.1, 0.2, 0.1), free="y"),)
+    loading = (uniaxial("strip", (0.1, 0.2, 0.1), free="y"), *strain_grid("pull", "x", (0.05,), "y", (0.2,)))
     text = parsed(replace(STUDY, design=replace(STUDY.design, loading=loading))).text
     row = text.index("strip")
-    assert text[row : row + 5] == ["strip", "3", "0.1 to 0.2", "Fxx 1.1, Fxy 0, Fyx 0, Fyy 1", "yarns along y"]
+    last = "Fxx 1.1, Fxy 0, Fyx 0, Fyy 1"
+    assert text[row : row + 6] == ["strip", "3", "0.1 to 0.2", "relaxed", last, "yarns along y"]
+    row = text.index("pull-x0p05-y")
+    start, last = "Fxx 1.05, Fxy 0, Fyx 0, Fyy 1", "Fxx 1.05, Fxy 0, Fyx 0, Fyy 1.2"
+    assert text[row : row + 6] == ["pull-x0p05-y", "1", "0.2 to 0.2", start, last, "none"]
 
 
 def rows_below(study: Study, heading: str) -> list[str]:

@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 from canned import Canned, canned_study
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from library_cases import grid_study
 
 from circuittex.base.errors import CircuittexError, ConvergenceError
 from circuittex.base.frozen import same
@@ -21,7 +22,7 @@ from circuittex.study.schedule import compute
 
 STUDY = canned_study(4)
 NAMES = [record.name for record in STUDY.records]
-PREVIOUS = {step.name: step.previous for step in plan(STUDY.design)}
+GRID = grid_study(contacts=10)
 
 
 class Shuffled:
@@ -45,9 +46,12 @@ class Shuffled:
         pass
 
 
-def run(known: list[str], size: int, pick: Callable[[int], int], fails: tuple[str, ...] = ()) -> tuple[Any, list[str]]:
+def run(
+    known: list[str], size: int, pick: Callable[[int], int], fails: tuple[str, ...] = (), whole: Study = STUDY
+) -> tuple[Any, list[str]]:
     """The study or the error, and the names of the records in the order in which they were kept."""
-    canned, kept = Canned(STUDY), list(known)
+    canned, kept = Canned(whole), list(known)
+    previous = {step.name: step.previous for step in plan(whole.design)}
 
     def fail(name: str) -> None:
         if name in fails:
@@ -55,13 +59,13 @@ def run(known: list[str], size: int, pick: Callable[[int], int], fails: tuple[st
 
     def keep(study: Study, recorded: Recorded) -> Study:
         record = recorded.record
-        assert PREVIOUS[record.name] in ("", *kept)
+        assert previous[record.name] in ("", *kept)
         assert record.contacts.mesh is study.mesh
         kept.append(record.name)
         return Study(**vars(study) | {"records": (*study.records, record)})
 
     canned.before = fail
-    start = Study(**vars(STUDY) | {"records": tuple(r for r in STUDY.records if r.name in known)})
+    start = Study(**vars(whole) | {"records": tuple(r for r in whole.records if r.name in known)})
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(schedule, "reach", canned.reach)
         patch.setattr(schedule, "record_state", canned.record_state)
@@ -105,3 +109,19 @@ def test_without_a_relaxed_state_there_is_nothing() -> None:
 
 def test_one_computer_follows_a_path_to_its_end() -> None:
     assert run([], 1, lambda n: 0)[1] == NAMES
+
+
+@settings(max_examples=10)
+@given(st.data(), st.integers(1, 4))
+def test_the_lines_of_a_grid_go_on_beside_one_another_from_the_states_of_the_first(
+    data: st.DataObject, size: int
+) -> None:
+    """Each state is reached from the one it starts from, which `Canned` checks, and where one fails the lines that
+    start from it are lost and no others."""
+    names = [step.name for step in plan(GRID.design)]
+    study, kept = run([], size, lambda n: data.draw(st.integers(0, n - 1)), whole=GRID)
+    assert same(study, GRID)
+    assert sorted(kept) == sorted(names)
+    error, kept = run([], size, lambda n: data.draw(st.integers(0, n - 1)), ("pull-x-0.06",), GRID)
+    assert isinstance(error, ConvergenceError)
+    assert set(names) - set(kept) == {"pull-x-0.06", "pull-x0p06-shear--0.01", "pull-x0p06-shear--0.04"}

@@ -23,7 +23,8 @@ from circuittex.results.store.archive import registry
 from circuittex.results.store.meaning import PLAIN, meanings, unit
 
 PURE = {
-    *("Record.strain", "Record.gradient", "Record.reduced_difference", "Loading.gradients", "Loading.strains"),
+    *("Record.strain", "Record.gradient", "Record.reduced_difference", "Loading.gradients", "Loading.start"),
+    "Loading.strains",
     *("ContactState.axial_factor", "FibrilMesh.directors", "FibrilMesh.poisson_ratio", "Material.poisson_ratio"),
     *("Verification.max_current_difference", "Verification.merge_error", "Verification.field_difference"),
     *("Verification.native_difference", "Verification.ngspice_limit"),  # V per V, or relative

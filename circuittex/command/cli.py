@@ -265,6 +265,7 @@ def _export(options: argparse.Namespace) -> ExitCode:
         ends=options.ends,
         thin=options.thin,
         rise=options.rise,
+        combine=tuple(filter(None, options.combine.split(","))),
         members=complete_members(options.results) if several else (),
     )
     print(f"{len(cells)} sub-circuits in {options.out}: see {options.out / 'datasheet.html'}")

@@ -240,6 +240,13 @@ def _add_export(commands: Commands) -> None:
         "--rise", metavar="K", type=float, default=10.0, help="temperature rise of the rated currents (default: 10 K)"
     )
     parser.add_argument(
+        "--combine",
+        metavar="A,B",
+        default="",
+        help="two strains of stretch_x, stretch_y and shear that must be inputs of one part: an error that names the "
+        "missing states where the study has no complete grid of both (where it has, the part is there anyway)",
+    )
+    parser.add_argument(
         "--kit",
         action="store_true",
         help="write also DIR/kit: circuits of three sizes with their answers, to check any other simulator by",

@@ -13,6 +13,7 @@ from circuittex.design.experiment import (
 )
 from circuittex.design.fabric import HERTZ, ContactLaw, Material, MaterialPair, Weave, Yarn
 from circuittex.design.files import load_design, parse_design, starter
+from circuittex.design.grid import strain_grid
 from circuittex.design.packing import Packing
 from circuittex.design.paper import plain_weave
 from circuittex.design.statement import Design, Electrical, Numerics, design_hash
@@ -41,5 +42,6 @@ __all__ = [
     "plain_weave",
     "shear",
     "starter",
+    "strain_grid",
     "uniaxial",
 ]

@@ -20,7 +20,8 @@ HIGHEST_VOLTAGE = 1e5
 
 @frozen
 class Loading:
-    """A sequence of recorded states, each an average in-plane deformation gradient from the relaxed state.
+    """A sequence of recorded states, each an average in-plane deformation gradient from the relaxed state; each starts
+    from the one before it, the first from the relaxed state unless told otherwise.
 
     >>> Loading("stretch", (((1.025, 0.0), (0.0, 1.0)),), (0.025,)).strains
     (0.025,)
@@ -34,6 +35,8 @@ class Loading:
     """The strain that labels each state."""
     free: str = ""
     """'x' or 'y': the ends of all yarns along that axis are let go, as the lateral edges of a strip test."""
+    start: Gradient = REST
+    """Gradient of the state that it starts from: the relaxed one, or one of a loading before it (`starting_state`)."""
 
     def __post_init__(self) -> None:
         at = f"loading.{name(self.name, 'loading.name')}"
@@ -47,6 +50,7 @@ class Loading:
             self,
             gradients=tuple(check_gradient(F, f"{at}.gradients[{i}]") for i, F in enumerate(self.gradients)),
             strains=tuple(real(e, f"{at}.strains[{i}]") for i, e in enumerate(self.strains)),
+            start=check_gradient(self.start, f"{at}.start"),
         )
         check_free_edges(self.free, self.gradients, f"{at}.free")
 

@@ -23,6 +23,7 @@ from circuittex.design.experiment import (
     uniaxial,
 )
 from circuittex.design.fabric import ContactLaw, Material, MaterialPair, Weave, Yarn, check_draft, check_rows
+from circuittex.design.grid import AXES, strain_grid
 from circuittex.design.packing import Packing
 from circuittex.design.statement import FORMAT, Design, Electrical, Numerics
 from circuittex.design.table import Table, quantity
@@ -38,6 +39,7 @@ _LOADING_KEYS = {
     "biaxial": ("strain", "steps", "strains", "unload"),
     "shear": ("strain", "steps", "strains", "unload", "free"),
     "path": ("gradients", "strains", "unload", "free"),
+    "grid": ("first", "then"),
 }
 
 
@@ -71,7 +73,7 @@ def read_design(mapping: object) -> Design:
         name=title,
         weave=_weave(top.get("weave", "a table [weave]"), yarns),
         contact=_contact(top.get("contact", "a table [contact]")),
-        loading=tuple(_loading(value, field) for value, field in _entries(top, "loading")),
+        loading=tuple(each for value, field in _entries(top, "loading") for each in _loading(value, field)),
         terminals=tuple(_named(top, "terminals", _terminal, optional=True).values()),
         probes=tuple(_probe(value, field) for value, field in _entries(top, "probes")),
         electrical=Electrical(**read(Electrical, Table(top.value.get("electrical", {}), "electrical"))),
@@ -166,7 +168,8 @@ def _pair(value: object, contact: Table, i: int) -> MaterialPair:
     return MaterialPair(**values, materials=(first, second))
 
 
-def _loading(value: object, field: str) -> Loading:
+def _loading(value: object, field: str) -> tuple[Loading, ...]:
+    """One loading; several for a grid."""
     keys = dict.fromkeys(key for taken in _LOADING_KEYS.values() for key in taken)
     table = Table(value, field, ("name", "kind", *keys))
     label = name(table.get("name", "a name for the loading"), table.at("name"))
@@ -176,17 +179,29 @@ def _loading(value: object, field: str) -> Loading:
         if key not in ("name", "kind", *_LOADING_KEYS[kind]):
             allowed = ", ".join(map(repr, _LOADING_KEYS[kind]))
             raise refuse(table.at(key), table.value[key], f"a loading of kind {kind!r} takes {allowed}")
+    if kind == "grid":
+        return _grid(table, label)
     free = one_of(table.value["free"], table.at("free"), ("x", "y")) if table.has("free") else ""
     loading = _stated(table, label, free) if kind == "path" else _stepped(table, label, kind, free)
     if not truth(table.value.get("unload", False), table.at("unload")):
-        return loading
+        return (loading,)
     _limit(table, "unload", 2 * len(loading.strains))
-    return load_unload(loading)
+    return (load_unload(loading),)
+
+
+def _grid(table: Table, label: str) -> tuple[Loading, ...]:
+    axes, strains = [], []
+    for key in _LOADING_KEYS["grid"]:
+        wanted = 'a table such as { axis = "x", strain = "10 %", steps = 4 }'
+        own = Table(table.get(key, wanted), table.at(key), ("axis", "strain", "steps", "strains"))
+        axes.append(one_of(own.get("axis", "one of " + ", ".join(map(repr, AXES))), own.at("axis"), AXES))
+        strains.append(_strains(own, axes[-1] == "shear"))
+    _limit(table, "then", (len(strains[0]) + 1) * (len(strains[1]) + 1))
+    return strain_grid(label, axes[0], strains[0], axes[1], strains[1])
 
 
 def _stepped(table: Table, label: str, kind: str, free: str) -> Loading:
-    shears = kind == "shear"
-    strains = _strains(table, above=-inf if shears else -1.0, at_least=1.0 - MOST_STRETCH if shears else -inf)
+    strains = _strains(table, kind == "shear")
     if kind == "uniaxial":
         axis = one_of(table.value.get("axis", "x"), table.at("axis"), ("x", "y"))
         return uniaxial(label, strains, axis, free)
@@ -208,8 +223,9 @@ def _size(gradient: Gradient) -> float:
     return (hypot(a + d, b - c) + hypot(a - d, b + c)) / 2.0
 
 
-def _strains(table: Table, above: float, at_least: float) -> tuple[float, ...]:
-    """Either `strains` as listed, or `steps` equal ones up to `strain`."""
+def _strains(table: Table, shears: bool) -> tuple[float, ...]:
+    """Either `strains` as listed, or `steps` equal ones up to `strain`; of shear, or of stretch."""
+    above, at_least = (-inf, 1.0 - MOST_STRETCH) if shears else (-1.0, -inf)
 
     def checked(strain: float, field: str) -> float:
         return real(strain, field, above=above, at_least=at_least, at_most=MOST_STRETCH - 1.0)

@@ -11,6 +11,7 @@ from circuittex.design.checks import distinct, refuse, title
 from circuittex.design.declaration import check, choice, count, flag, number, relative
 from circuittex.design.experiment import Loading, Probe, Terminal
 from circuittex.design.fabric import ContactLaw, Weave
+from circuittex.design.grid import starting_state
 from circuittex.design.packing import Packing
 from circuittex.design.resolution import Resolution, resolution
 from circuittex.design.units import parse
@@ -207,7 +208,7 @@ class Design:
     contact: ContactLaw
     """How its fibrils touch."""
     loading: tuple[Loading, ...] = ()
-    """The loading paths, each from the relaxed state."""
+    """The loading paths, each from the relaxed state or a state of one before it."""
     terminals: tuple[Terminal, ...] = ()
     """Yarn ends whose fibril ends are joined."""
     probes: tuple[Probe, ...] = ()
@@ -222,6 +223,8 @@ class Design:
     def __post_init__(self) -> None:
         title(self.name, "name")
         distinct(tuple(loading.name for loading in self.loading), "loading.name")
+        for place in range(len(self.loading)):
+            starting_state(self.loading, place)
         distinct(tuple(terminal.name for terminal in self.terminals), "terminals")
         distinct(tuple(probe.name for probe in self.probes), "probes.name")
         self._check_size()

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
+from circuittex.design.grid import starting_state
 from circuittex.results.records import Record, Study
 
 
 def by_loading(study: Study) -> dict[str, tuple[Record, ...]]:
-    """Name of a loading path -> its records, the relaxed state first: every loading starts there.
+    """Name of a loading path -> its records, that of the state where it starts first, whose strain is 0 there.
 
     A study of the relaxed state alone has one without a name.
     """
-    start = tuple(record for record in study.records if not record.loading)
-    names = dict.fromkeys(record.loading for record in study.records if record.loading)
-    return {name: start + tuple(r for r in study.records if r.loading == name) for name in names} or {"": start}
+    names = dict.fromkeys(record.loading for record in study.records)
+    own = {name: tuple(record for record in study.records if record.loading == name) for name in names}
+    relaxed = own.pop("", ())
+    start, loadings = dict[str, tuple[Record, ...]](), study.design.loading
+    for number, loading in enumerate(loadings):
+        if (place := starting_state(loadings, number)) and loading.name in own:
+            start[loading.name] = (replace(own[loadings[place[0]].name][place[1]], strain=0.0),)
+    return {name: start.get(name, relaxed) + records for name, records in own.items()} or {"": relaxed}
 
 
 def farthest(records: Sequence[Record]) -> Record:

@@ -127,7 +127,7 @@ def complete(folder: Path, study: Study) -> None:
     """Write whatever of the folder's files is missing, once all states are there."""
     for record in study.records:
         write_state(folder, study, record)
-    write_collections(folder / "vtu", study.records)
+    write_collections(folder / "vtu", study)
     write_numbers(folder, study)
     if needs_report(folder):
         write_report(folder, study)

@@ -10,10 +10,11 @@ import numpy as np
 from circuittex.base.arrays import Floats
 from circuittex.base.frozen import frozen
 from circuittex.design import Design, Loading
+from circuittex.design.grid import starting_state
 from circuittex.study.export import state_word
 
 RELAXED = "relaxed"
-"""Name of the state without loading, where every loading path starts."""
+"""Name of the state without loading, where loading paths start."""
 
 
 @frozen
@@ -45,8 +46,10 @@ def plan(design: Design) -> tuple[Step, ...]:
     """
     rest = np.eye(2)
     steps = [Step(RELAXED, "", "", 0.0, rest, rest, "")]
-    for loading, names in zip(design.loading, state_names(design.loading), strict=True):
-        previous, before = RELAXED, rest
+    every = state_names(design.loading)
+    for number, (loading, names) in enumerate(zip(design.loading, every, strict=True)):
+        place = starting_state(design.loading, number)
+        previous, before = (every[place[0]][place[1]] if place else RELAXED), np.array(loading.start)
         for name, strain, gradient in zip(names, loading.strains, loading.gradients, strict=True):
             after = np.array(gradient)
             steps.append(Step(name, previous, loading.name, strain, before, after, loading.free))

@@ -9,7 +9,8 @@ from typing import Any
 
 from markupsafe import Markup
 
-from circuittex.design import Design, Weave
+from circuittex.design import Design, Gradient, Weave
+from circuittex.design.experiment import REST
 from circuittex.results.report.number import number
 from circuittex.results.report.template import render
 
@@ -49,20 +50,23 @@ def _weave(weave: Weave) -> dict[str, Any]:
 
 
 def _loading(design: Design) -> dict[str, Any]:
-    head = ["loading", "states", "strain", "last average deformation gradient", "ends let go"]
+    head = ["loading", "states", "strain", "starts from", "last average deformation gradient", "ends let go"]
     rows = [
         [
             loading.name,
             str(len(loading.strains)),
             f"{min(loading.strains):g} to {max(loading.strains):g}",
-            ", ".join(
-                f"F{i}{j} {loading.gradients[-1][a][b]:g}" for a, i in enumerate("xy") for b, j in enumerate("xy")
-            ),
+            "relaxed" if loading.start == REST else _in_words(loading.start),
+            _in_words(loading.gradients[-1]),
             f"yarns along {loading.free}" if loading.free else "none",
         ]
         for loading in design.loading
     ]
     return _part("Loading", head, rows)
+
+
+def _in_words(gradient: Gradient) -> str:
+    return ", ".join(f"F{i}{j} {gradient[a][b]:g}" for a, i in enumerate("xy") for b, j in enumerate("xy"))
 
 
 def _terminals(design: Design) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -12,7 +12,8 @@ import numpy as np
 from circuittex.base.arrays import Ints
 from circuittex.base.atomic import replacing
 from circuittex.geometry.mesh import FibrilMesh
-from circuittex.results.records import Record
+from circuittex.results.loadings import by_loading
+from circuittex.results.records import Record, Study
 from circuittex.results.vtk import tubes
 
 SIDES = 12
@@ -71,16 +72,14 @@ def quads(nodes: Ints, sides: int) -> Ints:
     return np.stack([first + this, first + following, second + following, second + this], axis=-1).reshape(-1, 4)
 
 
-def write_collections(folder: str | Path, records: Sequence[Record]) -> tuple[Path, ...]:
+def write_collections(folder: str | Path, study: Study) -> tuple[Path, ...]:
     """Write a collection ``<loading path>.pvd`` of the files ``<record name>.vtu`` in `folder` for each loading path.
 
-    Every loading starts with the relaxed state; a study without loading gets ``relaxed.pvd``.
+    Every loading starts with the state that it starts from; a study without loading gets ``relaxed.pvd``.
     """
-    start = [record for record in records if not record.loading]
     written = []
-    for name in dict.fromkeys(record.loading for record in records if record.loading) or {"relaxed": None}:
-        states = start + [record for record in records if record.loading == name]
-        written.append(Path(folder) / f"{name}.pvd")
+    for name, states in by_loading(study).items():
+        written.append(Path(folder) / f"{name or 'relaxed'}.pvd")
         write_pvd(written[-1], [(record.strain, f"{record.name}.vtu") for record in states])
     return tuple(written)
 

@@ -19,6 +19,7 @@ from circuittex.results.plot.style import COLOURS, GREY, new_figure, save, style
 from circuittex.results.summary import insulated_resistances
 from circuittex.study.ensemble.quantities import SIDES
 from circuittex.study.ensemble.result import BANDS, Ensemble, percentiles
+from circuittex.study.plan import plan
 
 MOST_LINES = 40
 """Members up to which each is drawn as a line of its own."""
@@ -62,14 +63,14 @@ def _figure(ensemble: Ensemble, panels: Sequence[Panel]) -> Figure:
     with style():
         figure = new_figure(max(3.1 * len(panels), 4.0), 2.9 * len(loadings))
         for row, loading in enumerate(loadings):
-            states = np.flatnonzero([name in ("", loading) for name in ensemble.loadings])
+            states, strains = _along(ensemble, loading)
             for place, (title, label, shown) in enumerate(panels):
                 axes = figure.add_subplot(len(loadings), len(panels), row * len(panels) + place + 1)
                 for colour, (quantity, name) in enumerate(shown):
                     values = ensemble.values[:, states, column[quantity]]
                     # the panels of one quantity have the colours of their place, as in the report of a study
                     number = colour if len(shown) > 1 else place
-                    draw_band(axes, ensemble.strains[states], values, COLOURS[number % len(COLOURS)], name)
+                    draw_band(axes, strains, values, COLOURS[number % len(COLOURS)], name)
                 if shown[0][0].partition("_")[0] == "Ry":
                     _draw_insulated(axes, ensemble, shown[0][0])
                 _widen(axes)
@@ -79,6 +80,15 @@ def _figure(ensemble: Ensemble, panels: Sequence[Panel]) -> Figure:
                 if any(not text.startswith("_") for text in axes.get_legend_handles_labels()[1]):
                     axes.legend()
     return figure
+
+
+def _along(ensemble: Ensemble, loading: str) -> tuple[Ints, Floats]:
+    """The states of a loading path and their strains: 0 for the state that it starts from."""
+    own = np.flatnonzero([name == loading for name in ensemble.loadings])
+    if not loading:
+        return own, ensemble.strains[own]
+    start = next(step.previous for step in plan(ensemble.design) if step.loading == loading)
+    return np.append(ensemble.states.index(start), own), np.append(0.0, ensemble.strains[own])
 
 
 def _draw_insulated(axes: Axes, ensemble: Ensemble, quantity: str) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from circuittex.base.arrays import Floats
 from circuittex.base.atomic import write_text
 from circuittex.results.records import Study
 from circuittex.results.report.number import number
@@ -25,9 +26,11 @@ CAPTIONS = {
     "strain": "Change of the resistance between two pins, all others open: computed states and what the cells answer.",
     "network": "Medians of Ry and Rc of the fitted cell.",
 }
+NO_GRID = {
+    "Two strains at once": "not available: the states under both at once were not computed (a loading of kind 'grid')"
+}
 NO_CORNERS = {"Corners and Monte Carlo": "not available: the library is made of one study, not of an ensemble"}
 MISSING = {
-    "Two loadings at once": "not available: a part for each, since the states under both at once were not computed",
     "Temperature coefficient": "not available: the conductivities of the design do not depend on temperature",
     "Capacitance, inductance": "not available: the model has no answer",
     "Power rating": "the rated current squared times the resistance of the probe",
@@ -52,7 +55,7 @@ def write_datasheet(
         cells=_cells(cells, networks),
         ratings=_ratings(study, known),
         rise=number(known.rise),
-        missing=({} if len(known.reductions) > 2 else NO_CORNERS) | MISSING,
+        missing=({} if known.grids else NO_GRID) | ({} if len(known.reductions) > 2 else NO_CORNERS) | MISSING,
         figures=[picture(CAPTIONS[name], png) for name, png in pictures.items()],
         version=study.version,
     )
@@ -67,11 +70,21 @@ def _facts(study: Study, known: Facts) -> dict[str, str]:
         "Yarn ends": known.ends,
         "Pins": ", ".join(known.levels.pins),
         "Strain": "; ".join(
-            f"{path.word}: {100 * path.strain[0]:.4g} % to {100 * path.strain[-1]:.4g} %, {len(path.strain)} states"
-            for path in known.paths
+            [
+                *(f"{path.word}: {_range(path.strain)}, {len(path.strain)} states" for path in known.paths),
+                *(
+                    f"{grid.axes[0]}: {_range(grid.first)}, with {grid.axes[1]}: {_range(grid.second)}, "
+                    f"{len(grid.first)} x {len(grid.second)} states"
+                    for grid in known.grids
+                ),
+            ]
         )
         or "one state only: strain is no input",
     }
+
+
+def _range(strain: Floats) -> str:
+    return f"{100 * strain[0]:.4g} % to {100 * strain[-1]:.4g} %"
 
 
 def _recommendation(known: Facts) -> str:

@@ -15,9 +15,9 @@ class Dialect:
     name: str
     """'ngspice', 'ltspice', 'xyce' or 'gnucap'."""
     choice: str
-    """A choice by a condition, with the fields `if_`, `then` and `other`; empty where strain can be no input."""
+    """A choice by a condition, with the fields `if_`, `then` and `other`."""
     expression: str
-    """A behavioural source's expression, with the field `of`."""
+    """A behavioural source's expression, with the field `of`; empty where there are no such sources."""
     parameters: str
     """What stands before the parameters of a `.subckt` card."""
 
@@ -36,7 +36,7 @@ DIALECTS = {
         Dialect("ngspice", "({if_} ? {then} : {other})", "{of}", ""),
         Dialect("ltspice", "if({if_},{then},{other})", "{of}", ""),
         Dialect("xyce", "IF({if_},{then},{other})", "{{{of}}}", "PARAMS: "),
-        Dialect("gnucap", "", "", ""),
+        Dialect("gnucap", "if({if_},{then},{other})", "", ""),
     )
 }
 """The programs by name. Only Xyce's manual asks for `PARAMS:`, at which other readers stop."""

@@ -16,16 +16,18 @@ SINE = {"ltspice": "SINE"}
 """How the source is called where it is not SIN."""
 
 
-def example_deck(cell: Cell, ends: tuple[str, str], low: float, high: float, floating: Sequence[str] = ()) -> str:
+def example_deck(
+    cell: Cell, ends: tuple[str, str], ranges: Sequence[tuple[float, float]], floating: Sequence[str] = ()
+) -> str:
     """A deck that measures between two pins, `ends`, to stand in a folder beside that of the cell's file.
 
-    `low` and `high` are the smallest and largest sampled strain; they do not matter where strain is no input.
+    `ranges`: smallest and largest sampled strain of each input; they do not matter where strain is none.
     `floating` pins, of parts that nothing joins to these, have a large resistor to ground.
     """
     if cell.parameters:
-        return _parameter(cell, ends, low, high, floating)
+        return _parameter(cell, ends, ranges, floating)
     pin = any(pin.kind == "control" for pin in cell.pins)
-    return _pin(cell, ends, low, high, floating) if pin else _resistance(cell, ends, floating)
+    return _pin(cell, ends, ranges, floating) if pin else _resistance(cell, ends, floating)
 
 
 def _resistance(cell: Cell, ends: tuple[str, str], floating: Sequence[str]) -> str:
@@ -34,21 +36,29 @@ def _resistance(cell: Cell, ends: tuple[str, str], floating: Sequence[str]) -> s
     return _deck(cell, OHMMETER.format(*ends), lines)
 
 
-def _parameter(cell: Cell, ends: tuple[str, str], low: float, high: float, floating: Sequence[str]) -> str:
+def _parameter(
+    cell: Cell, ends: tuple[str, str], ranges: Sequence[tuple[float, float]], floating: Sequence[str]
+) -> str:
     what = f"{OHMMETER.format(*ends)}; at the lowest strain, amid the range, and beyond it, where the flag is up"
     lines = []
-    for number, strain in enumerate((low, (low + high) / 2, 2 * high - low), 1):
-        given = f" {DIALECTS[cell.dialect].parameters}strain={strain!r}"
+    places = [(low, (low + high) / 2, 2 * high - low) for low, high in ranges]
+    for number, strains in enumerate(zip(*places, strict=True), 1):
+        values = " ".join(f"{name}={e!r}" for (name, _), e in zip(cell.parameters, strains, strict=False))
+        given = f" {DIALECTS[cell.dialect].parameters}{values}"
         lines += [f"V{number} in_{number} 0 1", _call(cell, ends, f"_{number}") + given]
         lines += _grounded(ends, floating, f"_{number}")
     show = "i(V1) i(V2) i(V3) v(out_of_range_1) v(out_of_range_3)"
     return _deck(cell, what, [*lines, f".print dc {show}", ".dc V1 1 1 1"])
 
 
-def _pin(cell: Cell, ends: tuple[str, str], low: float, high: float, floating: Sequence[str]) -> str:
-    sine = f"{SINE.get(cell.dialect, 'SIN')}({(low + high) / 2!r} {(high - low) / 2!r} 100 0 0 -90)"
-    lines = ["V1 in 0 1", f"Vstrain strain 0 {sine}", _call(cell, ends), *_grounded(ends, floating)]
-    lines.append(".print tran v(strain) i(V1) v(out_of_range)")
+def _pin(cell: Cell, ends: tuple[str, str], ranges: Sequence[tuple[float, float]], floating: Sequence[str]) -> str:
+    inputs = [pin.name for pin in cell.pins if pin.kind == "control"]
+    lines = ["V1 in 0 1"]
+    for name, (low, high) in zip(inputs, ranges, strict=True):
+        sine = f"{SINE.get(cell.dialect, 'SIN')}({(low + high) / 2!r} {(high - low) / 2!r} 100 0 0 -90)"
+        lines.append(f"V{name} {name} 0 {sine}")
+    lines += [_call(cell, ends), *_grounded(ends, floating)]
+    lines.append(f".print tran {' '.join(f'v({name})' for name in inputs)} i(V1) v(out_of_range)")
     if cell.dialect != "xyce":
         lines.append(".meas tran i_stretched FIND i(V1) AT=5m")
     return _deck(

@@ -20,8 +20,10 @@ from circuittex.study.export import probe_netlist, simplified
 from circuittex.study.library.accuracy import Errors
 from circuittex.study.library.cell import DIALECTS, Cell
 from circuittex.study.library.datasheet import write_datasheet
+from circuittex.study.library.dialect import DIALECTS as SYNTAX
 from circuittex.study.library.examples import crimped_probe, example_deck
 from circuittex.study.library.facts import Facts, facts_of
+from circuittex.study.library.grid_parts import grid_parts
 from circuittex.study.library.levels import CRIMPED, ENDS, FREE, detailed
 from circuittex.study.library.network import Network, farthest, floating
 from circuittex.study.library.parts import Part, fixed_parts, strained_parts
@@ -43,6 +45,7 @@ def export_library(
     thin: float = 0.0,
     dialects: Sequence[str] = DIALECTS,
     rise: float = 10.0,
+    combine: Sequence[str] = (),
     members: Iterable[Study] = (),
 ) -> tuple[Cell, ...]:
     """Write the sub-circuits of a study into `folder`, with symbols, library.json, examples and datasheet.html.
@@ -50,13 +53,15 @@ def export_library(
     Names of sub-circuits begin with `name` and are the same for every study and state. Cells in which strain is no
     input are of `state`, the first recorded one unless named. `ends`: see `ENDS`. With `thin` > 0 there are also ports
     with fewer resistors, whose resistances rise by at most that part. Ratings are for `rise` kelvin.
+    Two strains, of `strain_grid.AXES`, are inputs of one part where the study has all states of a grid of them; with
+    `combine`, the names of both, it is an error where it has not.
     `members` of an ensemble, `study` among them, give corners: see `reduction.corners`.
 
     Raises `DesignError` for an argument and `CircuitError` for a study that cannot be used.
     """
     chosen = _checked(study, state, ends, thin, dialects, rise)
     _note_missing(study)
-    known = facts_of(study, ends, thin, rise, members)
+    known = facts_of(study, ends, thin, rise, members, combine)
     word = safe_name(name) + ("_free" if ends == FREE else "")
     found = list(_parts(study, known, word, chosen, ends))
     folder = Path(folder)
@@ -64,7 +69,7 @@ def export_library(
         _write(folder, study, known, part, dialect, chosen)
         for dialect in dialects
         for part in found
-        if dialect != "gnucap" or not part.path
+        if SYNTAX[dialect].expression or not any(pin.kind == "control" for pin in part.pins)
     ]
     networks = {part.name: part.network for part in found}
     _write_examples(folder / "examples", cells, networks)
@@ -126,6 +131,8 @@ def _parts(study: Study, known: Facts, word: str, chosen: int, ends: str) -> Ite
     yield from fixed_parts(word, design, known.levels, known.reductions, chosen, circuit)
     for path in known.paths:
         yield from strained_parts(word, design, known.levels, known.reductions, path)
+    for grid in known.grids:
+        yield from grid_parts(word, design, known.levels, known.reductions, grid)
 
 
 def _write(folder: Path, study: Study, known: Facts, part: Part, dialect: str, chosen: int) -> Cell:
@@ -145,8 +152,8 @@ def _write_examples(folder: Path, cells: Sequence[Cell], networks: Mapping[str, 
     for cell in cells:
         if cell.level != "detailed":
             network, (source, sink) = networks[cell.name], ends[cell.name]
-            low, high = network.strain[[0, -1]].tolist()
-            text = example_deck(cell, (source, sink), low, high, floating(network, sink))
+            ranges = [axis.range for axis in network.axes]
+            text = example_deck(cell, (source, sink), ranges, floating(network, sink))
             _write_ascii(folder / f"{cell.dialect}_{cell.name}.cir", text)
 
 

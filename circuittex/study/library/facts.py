@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -11,12 +11,14 @@ from circuittex.base.frozen import frozen
 from circuittex.electrical.network.ports import port_matrix
 from circuittex.results.records import Study
 from circuittex.study.library.accuracy import Errors, compared
+from circuittex.study.library.bicubic import left_out
 from circuittex.study.library.interpolation import without
 from circuittex.study.library.levels import CRIMPED, Levels, levels, port_matrices
 from circuittex.study.library.network import matrix_at, ports_network
 from circuittex.study.library.parts import Part
 from circuittex.study.library.rating import rated_currents
 from circuittex.study.library.reduction import Reduction, corners, exact, thin
+from circuittex.study.library.strain_grid import StrainGrid, grids
 from circuittex.study.library.strain_path import StrainPath, paths
 
 GOOD = 0.01
@@ -35,10 +37,13 @@ class Facts:
     """Of the ports: the exact one, a thinned one where asked for, and the corners of an ensemble."""
     paths: tuple[StrainPath, ...]
     """The ways along which strain is an input."""
+    grids: tuple[StrainGrid, ...]
+    """The pairs of strains that are inputs together."""
     errors: dict[str, Errors]
     """Of 'cell' and 'ports_thin', in all states, where they are there."""
     left_out: dict[str, Errors]
-    """By the word of a path: errors of its inner states found from all others."""
+    """By the word of a path: errors of its inner states found from all others; by that of a grid: errors of its states
+    found without their lines."""
     rise: float
     """K: what the rated currents warm the hottest fibril by."""
     rated: Floats
@@ -61,15 +66,28 @@ class Facts:
         elif level == "ports":
             found.append(("errors", "none: the exact reduction of the detailed network to its pins"))
         if part.path in self.left_out:
-            found.append(("errors of ports at inner states by all others", _words(self.left_out[part.path])))
+            found.append((f"errors of ports at {_which(part)}", _words(self.left_out[part.path])))
         if part.path:
-            low, high = part.network.strain[[0, -1]].tolist()
-            found.append(("strain", f"from {low!r} to {high!r}; beyond, the last values, and out_of_range is 1 V"))
+            for axis in part.network.axes:
+                low, high = axis.range
+                text = f"from {low!r} to {high!r}; beyond, the last values, and out_of_range is 1 V"
+                found.append((axis.word, text))
         return found
 
 
-def facts_of(study: Study, ends: str, error: float, rise: float, members: Iterable[Study]) -> Facts:
-    """Reduce, fit, thin where an error is allowed, find the corners of `members`, and compare."""
+def _which(part: Part) -> str:
+    """The states whose errors of interpolation are stated."""
+    return "states by the grid without their lines" if part.network.grid else "inner states by all others"
+
+
+def facts_of(
+    study: Study, ends: str, error: float, rise: float, members: Iterable[Study], combine: Sequence[str] = ()
+) -> Facts:
+    """Reduce, fit, thin where an error is allowed, find the corners of `members`, and compare.
+
+    Raises `DesignError` where the grid of the strains `combine` is not complete.
+    """
+    meshes = grids(study, combine)
     known = levels(study, ends)
     errors = {}
     if not known.reason:
@@ -83,7 +101,8 @@ def facts_of(study: Study, ends: str, error: float, rise: float, members: Iterab
         reductions += corners(packings)
     ways = paths(study)
     left = {way.word: _left_out(known, way) for way in ways if len(way.strain) > 2}
-    return Facts(known, tuple(reductions), ways, errors, left, rise, rated_currents(study, rise), ends)
+    left |= {grid.word: _left_out_of_grid(known, grid) for grid in meshes if grid.records.size > 4}
+    return Facts(known, tuple(reductions), ways, meshes, errors, left, rise, rated_currents(study, rise), ends)
 
 
 def _left_out(known: Levels, way: StrainPath) -> Errors:
@@ -94,6 +113,21 @@ def _left_out(known: Levels, way: StrainPath) -> Errors:
     found = [matrix_at(network, without(network.strain, network.conductance, k)) for k in inner]
     relaxed = own[int(np.argmin(np.abs(way.strain)))]
     return compared([relaxed, *own[1:-1]], [relaxed, *found])
+
+
+def _left_out_of_grid(known: Levels, grid: StrainGrid) -> Errors:
+    """Errors of the ports of each state but the corners, interpolated without the lines on which it lies inside."""
+    states = grid.records.ravel()
+    own = [known.ports[k] for k in states]
+    network = ports_network(own, np.arange(float(len(own))))
+    on = network.conductance.reshape(*grid.records.shape, -1)
+    exact, found = [], []
+    for k, (i, j) in enumerate(np.ndindex(grid.records.shape)):
+        if (rest := left_out(grid.first, grid.second, on, i, j)) is not None:
+            exact.append(own[k])
+            found.append(matrix_at(network, rest))
+    relaxed = known.ports[grid.records[np.argmin(np.abs(grid.first)), np.argmin(np.abs(grid.second))]]
+    return compared([relaxed, *exact], [relaxed, *found])
 
 
 def _words(errors: Errors) -> str:

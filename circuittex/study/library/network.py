@@ -27,6 +27,21 @@ ALIKE = 1e-6
 
 
 @frozen
+class Axis:
+    """A strain that is an input."""
+
+    word: str
+    """The parameter or pin."""
+    strain: Floats
+    """(n,) at which states are known, rising."""
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Smallest and largest."""
+        return float(self.strain[0]), float(self.strain[-1])
+
+
+@frozen
 class Network:
     """R resistors, P pins, K states."""
 
@@ -37,9 +52,16 @@ class Network:
     nodes: tuple[tuple[str, str], ...]
     """(R,) the two nodes of each resistor, words."""
     strain: Floats
-    """(K,) rising; one value where strain is no input."""
+    """(K,) rising; one value where strain is no input; of a grid of two strains the number of each state."""
     conductance: Floats
     """(K, R) S, positive."""
+    grid: tuple[Axis, ...] = ()
+    """Where two strains are inputs, both; the states are those of their grid, row by row along the second."""
+
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        """The strains that are inputs."""
+        return self.grid or (Axis(STRAIN, self.strain),)
 
 
 def ports_network(matrices: Sequence[PortMatrix], strain: Floats) -> Network:

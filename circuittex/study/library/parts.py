@@ -48,7 +48,7 @@ class Part:
     parameters: tuple[tuple[str, str], ...]
     """Name and default."""
     path: str
-    """Word of the path along which strain is an input; empty where it is none."""
+    """Word of the path or grid along which strain is an input; empty where it is none."""
     spread: tuple[Network, Network] | None = None
     """The networks at the 5th and the 95th percentile of resistance, where the place among them is a parameter."""
 
@@ -77,7 +77,7 @@ def strained_parts(
     """Ports, cell and unit with strain as a parameter and as a pin, and the ports with a place among the corners."""
     networks = {each.end: ports_network([each.ports[k] for k in path.records], path.strain) for each in reductions}
     for each in reductions:
-        yield from _strained(name, design, "ports", each.end, each.title, networks[each.end], path)
+        yield from strained(name, design, "ports", each.end, each.title, networks[each.end], path.word)
     if set(CORNERS) <= set(networks):
         yield from _monte_carlo(name, design, [networks[end] for end in CORNERS], path)
     if known.reason:
@@ -92,7 +92,7 @@ def strained_parts(
         warnings.warn(f"no cell of Ry and Rc for {path.loading!r}: {error}", CircuittexWarning, stacklevel=3)
         return
     for level, network in found.items():
-        yield from _strained(name, design, level, "", TITLES[level], network, path)
+        yield from strained(name, design, level, "", TITLES[level], network, path.word)
 
 
 def _monte_carlo(name: str, design: Design, corners: Sequence[Network], path: StrainPath) -> Iterator[Part]:
@@ -110,16 +110,17 @@ def _monte_carlo(name: str, design: Design, corners: Sequence[Network], path: St
     )
 
 
-def _strained(
-    name: str, design: Design, level: str, end: str, title: str, network: Network, path: StrainPath
+def strained(
+    name: str, design: Design, level: str, end: str, title: str, network: Network, word: str
 ) -> Iterator[Part]:
-    """Strain as a parameter and as a pin."""
-    base, plain = f"{name}_{level}{end}_{path.word}", pins(design, network)
-    what = f"{title}, strain of the loading as a"
-    given = ((STRAIN, "0"),)
-    yield Part(base + PARAMETER, level, end, f"{what} parameter", network, (*plain, FLAGGED), given, path.word)
-    control = (*plain, Pin(STRAIN, "bottom", "control"), FLAGGED)
-    yield Part(base + PIN, level, end, f"{what} voltage (1 V = 100 %)", network, control, (), path.word)
+    """The strains of a network as parameters and as pins."""
+    base, plain = f"{name}_{level}{end}_{word}", pins(design, network)
+    words = [axis.word for axis in network.axes]
+    what = f"{title}, {' and '.join(words) if network.grid else 'strain of the loading'} as a"
+    given = tuple((word, "0") for word in words)
+    yield Part(base + PARAMETER, level, end, f"{what} parameter", network, (*plain, FLAGGED), given, word)
+    control = (*plain, *(Pin(each, "bottom", "control") for each in words), FLAGGED)
+    yield Part(base + PIN, level, end, f"{what} voltage (1 V = 100 %)", network, control, (), word)
 
 
 def unit_network(values: Floats, strain: Floats) -> Network:

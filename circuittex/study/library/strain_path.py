@@ -9,6 +9,7 @@ import numpy as np
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.frozen import frozen
+from circuittex.design.experiment import REST
 from circuittex.electrical.network.names import unique_names
 from circuittex.results.records import Study
 
@@ -28,12 +29,15 @@ class StrainPath:
 
 
 def paths(study: Study) -> tuple[StrainPath, ...]:
-    """The paths of all loadings of which at least one state beside the relaxed one is recorded, in their order."""
+    """The paths of all loadings of which at least one state beside the relaxed one is recorded, in their order.
+
+    A loading that starts from a strained state has none: its strain is not all that it does to the fabric.
+    """
     found = []
     words = unique_names([loading.name for loading in study.design.loading])
     for loading, word in zip(study.design.loading, words, strict=True):
         own = [k for k, record in enumerate(study.records) if record.loading == loading.name]
-        if not own or study.records[0].loading:
+        if not own or study.records[0].loading or loading.start != REST:
             continue
         states = np.array([0, *own])
         strain = np.array([study.records[k].strain for k in states])

@@ -8,14 +8,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from circuittex.base.arrays import Ints
+from circuittex.base.arrays import Floats, Ints
 from circuittex.base.frozen import frozen
 from circuittex.base.version import __version__
 from circuittex.electrical.network.names import unique_names
+from circuittex.study.library.bicubic import Patches, patches
 from circuittex.study.library.cell import Cell
 from circuittex.study.library.dialect import DIALECTS, Dialect
 from circuittex.study.library.interpolation import Pieces, pieces
-from circuittex.study.library.network import CONTROLS, FLAG, SPREAD, SPREAD_USED, STRAIN, USED, Network
+from circuittex.study.library.network import FLAG, SPREAD, SPREAD_USED, STRAIN, USED, Axis, Network
+from circuittex.study.library.polynomial import cubic, patch_of, piece_of
 
 SLACK = 1e-6
 """A strain this part of the range beyond its ends is at the end: a source's rounding raises no flag."""
@@ -72,9 +74,13 @@ def _fixed(network: Network) -> list[str]:
 
 @frozen
 class _Strained:
-    """A network whose resistors follow a strain: those of one conductance share its logarithm."""
+    """A network whose resistors follow its strains: those of one conductance share its logarithm."""
 
-    pieces: Pieces
+    axes: tuple[Axis, ...]
+    """The strains."""
+    used: tuple[str, ...]
+    """Words for the strains that are used inside."""
+    pieces: Pieces | Patches
     """Of the L conductances that differ."""
     logs: tuple[str, ...]
     """(L,) words for their logarithms, which no node has."""
@@ -86,32 +92,45 @@ class _Strained:
 
 def _strained(network: Network) -> _Strained:
     different, own = np.unique(network.conductance, axis=1, return_inverse=True)
-    nodes = dict.fromkeys([*CONTROLS, *network.pins, *(node for ends in network.nodes for node in ends)])
-    logs = unique_names([*nodes, *(f"log_{k + 1}" for k in range(different.shape[1]))])[len(nodes) :]
-    devices = unique_names([*CONTROLS, *logs, *network.names])[len(CONTROLS) + len(logs) :]
-    return _Strained(pieces(network.strain, different), logs, own.ravel(), devices)
+    axes = network.axes
+    words = [FLAG, *(axis.word for axis in axes)]
+    nodes = dict.fromkeys([*words, *network.pins, *(node for ends in network.nodes for node in ends)])
+    inner = [*(f"{axis.word}_used" for axis in axes), *(f"log_{k + 1}" for k in range(different.shape[1]))]
+    inner = list(unique_names([*nodes, *inner])[len(nodes) :])
+    used, logs = tuple(inner[: len(axes)]), tuple(inner[len(axes) :])
+    taken = [*words, *used, *logs]
+    devices = unique_names([*taken, *network.names])[len(taken) :]
+    return _Strained(axes, used, _between(network, different), logs, own.ravel(), devices)
+
+
+def _between(network: Network, conductance: Floats) -> Pieces | Patches:
+    """Conductances (K, L) between the states of a network."""
+    if not network.grid:
+        return pieces(network.strain, conductance)
+    first, second = (axis.strain for axis in network.grid)
+    return patches(first, second, conductance.reshape(len(first), len(second), -1))
 
 
 def _by_parameter(network: Network, dialect: Dialect) -> list[str]:
-    """Resistors whose values follow the parameter, and a source for the flag."""
+    """Resistors whose values follow the parameters, and a source for the flag."""
     known = _strained(network)
-    lines = [f".param {USED}={{{_clamped(STRAIN, known.pieces)}}}"]
-    lines += [
-        f".param {log}={{{_log_conductance(known.pieces, k, USED, dialect)}}}" for k, log in enumerate(known.logs)
+    lines = [
+        f".param {used}={{{_clamped(axis.word, axis)}}}" for axis, used in zip(known.axes, known.used, strict=True)
     ]
+    lines += [f".param {log}={{{_logarithm(known, k, known.used, dialect)}}}" for k, log in enumerate(known.logs)]
     lines += [
         f"R{name} {a} {b} {{exp(-{known.logs[k]})}}"
         for name, (a, b), k in zip(known.devices, network.nodes, known.own.tolist(), strict=True)
     ]
-    return [*lines, f"V{FLAG} {FLAG} 0 {{{_outside(STRAIN, known.pieces, dialect)}}}"]
+    given = [axis.word for axis in known.axes]
+    return [*lines, f"V{FLAG} {FLAG} 0 {{{_outside(given, known.axes, dialect)}}}"]
 
 
 def _by_spread(network: Network, low: Network, high: Network, dialect: Dialect) -> list[str]:
     """As `_by_parameter`, and the logarithm of every resistance goes with the parameter mc from that of the median
     towards that of its 5th percentile (mc = -1.645) or its 95th (1.645), and straight on as far as `FURTHEST`."""
     lines = [f".param {SPREAD_USED}={{min(max({SPREAD},-{FURTHEST!r}),{FURTHEST!r})/{NORMAL!r}}}"]
-    found = pieces(network.strain, network.conductance)
-    lines.append(f".param {USED}={{{_clamped(STRAIN, found)}}}")
+    lines.append(f".param {USED}={{{_clamped(STRAIN, *network.axes)}}}")
     for k, (name, (a, b)) in enumerate(zip(network.names, network.nodes, strict=True)):
         words = [f"{kind}_{k + 1}" for kind in ("middle", "low", "high")]
         for word, each in zip(words, (network, low, high), strict=True):
@@ -120,7 +139,7 @@ def _by_spread(network: Network, low: Network, high: Network, dialect: Dialect) 
         middle, lower, upper = words
         share = dialect.choose(f"{SPREAD_USED}<0", f"{middle}-{lower}", f"{upper}-{middle}")
         lines.append(f"R{name} {a} {b} {{exp(-{middle}-{SPREAD_USED}*{share})}}")
-    return [*lines, f"V{FLAG} {FLAG} 0 {{{_outside(STRAIN, found, dialect)}}}"]
+    return [*lines, f"V{FLAG} {FLAG} 0 {{{_outside([STRAIN], network.axes, dialect)}}}"]
 
 
 def _by_pin(network: Network, dialect: Dialect) -> list[str]:
@@ -135,46 +154,47 @@ def _by_pin(network: Network, dialect: Dialect) -> list[str]:
     def source(name: str, plus: str, minus: str, quantity: str, of: str) -> str:
         return f"B{name} {plus} {minus} {quantity}={dialect.expression.format(of=of)}"
 
-    lines = [f"R{STRAIN} {STRAIN} 0 {OPEN!r}", source(USED, USED, "0", "V", _clamped(f"V({STRAIN})", known.pieces))]
-    lines += [
-        source(log, log, "0", "V", _log_conductance(known.pieces, k, f"V({USED})", dialect))
-        for k, log in enumerate(known.logs)
-    ]
+    lines = []
+    for axis, used in zip(known.axes, known.used, strict=True):
+        lines.append(f"R{axis.word} {axis.word} 0 {OPEN!r}")
+        lines.append(source(used, used, "0", "V", _clamped(f"V({axis.word})", axis)))
+    volts = [f"V({used})" for used in known.used]
+    lines += [source(log, log, "0", "V", _logarithm(known, k, volts, dialect)) for k, log in enumerate(known.logs)]
     bounds = known.pieces.bounds.T.tolist()
     for name, (a, b), k in zip(known.devices, network.nodes, known.own.tolist(), strict=True):
         low, high = bounds[k]
         lines.append(source(name, a, b, "I", f"V({a},{b})*exp(min(max(V({known.logs[k]}),{low!r}),{high!r}))"))
-    return [*lines, source(FLAG, FLAG, "0", "V", _outside(f"V({STRAIN})", known.pieces, dialect))]
+    given = [f"V({axis.word})" for axis in known.axes]
+    return [*lines, source(FLAG, FLAG, "0", "V", _outside(given, known.axes, dialect))]
 
 
-def _clamped(strain: str, found: Pieces) -> str:
+def _clamped(strain: str, axis: Axis) -> str:
     """The strain within the sampled range."""
-    return f"min(max({strain},{float(found.knots[0])!r}),{float(found.knots[-1])!r})"
+    low, high = axis.range
+    return f"min(max({strain},{low!r}),{high!r})"
 
 
-def _outside(strain: str, found: Pieces, dialect: Dialect) -> str:
-    """1 where a strain is outside the sampled range, else 0."""
-    slack = SLACK * float(found.knots[-1] - found.knots[0])
-    low, high = float(found.knots[0]) - slack, float(found.knots[-1]) + slack
-    return dialect.choose(f"{strain}<{low!r}", "1", dialect.choose(f"{strain}>{high!r}", "1", "0"))
+def _outside(strains: Sequence[str], axes: Sequence[Axis], dialect: Dialect) -> str:
+    """1 where a strain is outside its sampled range, else 0."""
+    found = "0"
+    for strain, axis in reversed(list(zip(strains, axes, strict=True))):
+        low, high = axis.range
+        slack = SLACK * (high - low)
+        found = dialect.choose(f"{strain}>{high + slack!r}", "1", found)
+        found = dialect.choose(f"{strain}<{low - slack!r}", "1", found)
+    return found
+
+
+def _logarithm(known: _Strained, k: int, strains: Sequence[str], dialect: Dialect) -> str:
+    """The logarithm of one of the conductances that differ, in S."""
+    if isinstance(known.pieces, Patches):
+        return patch_of(known.pieces, k, strains[0], strains[1], dialect)
+    return _log_conductance(known.pieces, k, strains[0], dialect)
 
 
 def _log_conductance(found: Pieces, resistor: int, strain: str, dialect: Dialect) -> str:
-    """The logarithm of a conductance in S: the cubic of the piece in which a strain lies, found by halving."""
+    """The logarithm of a conductance in S: the cubic of the piece in which a strain lies."""
     cubics = found.coefficients[:, :, resistor].T.tolist()
     knots = found.knots.tolist()
-
-    def between(first: int, last: int) -> str:
-        if last - first == 1:
-            return _cubic(strain, knots[first], cubics[first])
-        middle = (first + last) // 2
-        return dialect.choose(f"{strain}<{knots[middle]!r}", between(first, middle), between(middle, last))
-
-    return f"({between(0, len(cubics))})"
-
-
-def _cubic(strain: str, start: float, coefficients: Sequence[float]) -> str:
-    """c_0 + t (c_1 + t (c_2 + t c_3)) with t = strain - start."""
-    t = strain if start == 0.0 else f"({strain}-({start!r}))"
-    c0, c1, c2, c3 = coefficients
-    return f"({c0!r})+{t}*(({c1!r})+{t}*(({c2!r})+{t}*({c3!r})))"
+    texts = [cubic(strain, start, [repr(c) for c in four]) for start, four in zip(knots, cubics, strict=False)]
+    return f"({piece_of(texts, knots, strain, dialect)})"

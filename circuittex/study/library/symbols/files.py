@@ -32,7 +32,7 @@ def write_symbols(folder: Path, name: str, design: str, cells: Sequence[Cell], n
 
 
 def shown_cell(cells: Sequence[Cell]) -> Cell:
-    """The ports with strain as a pin where there are such, else the ports of one state.
+    """The ports with one strain as a pin where there are such, else the ports of one state.
 
     >>> from circuittex.study.library.cell import Pin
     >>> pins = (Pin("a", "left", "electrical"), Pin("b", "right", "electrical"))
@@ -40,4 +40,4 @@ def shown_cell(cells: Sequence[Cell]) -> Cell:
     'x_ports'
     """
     ports = [cell for cell in cells if cell.level == "ports"]
-    return next((cell for cell in ports if any(pin.kind == "control" for pin in cell.pins)), ports[0])
+    return next((cell for cell in ports if sum(pin.kind == "control" for pin in cell.pins) == 1), ports[0])

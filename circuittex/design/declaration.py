@@ -14,6 +14,7 @@ from math import inf
 from textwrap import wrap
 from typing import Any
 
+from circuittex.design.checks import name as checked_name
 from circuittex.design.checks import one_of, real, refuse, store, truth, whole
 from circuittex.design.table import Table, quantity
 
@@ -122,6 +123,20 @@ def choice(note: str, choices: tuple[str, ...], *, shown: str) -> Mapping[str, K
     allowed = ", ".join(f'"{word}"' for word in choices)
     return _metadata(
         lambda value, field: one_of(value, field, choices), _as_it_is, allowed, allowed, f'"{shown}"', note
+    )
+
+
+def word(note: str, words: Callable[[], tuple[str, ...]], *, shown: str) -> Mapping[str, Key]:
+    """Metadata of a field with one of `words()`, to which users may add: asked for when a file is read.
+
+    In Python any name will do: results are read where what a user once added is not known.
+
+    >>> word("which law", lambda: ("paper", "strip"), shown="paper")["key"].check("mine", "law")
+    'mine'
+    """
+    allowed = ", ".join(f'"{each}"' for each in words()) + ", or one that was added"
+    return _metadata(
+        checked_name, lambda value, field: one_of(value, field, words()), allowed, allowed, f'"{shown}"', note
     )
 
 

@@ -21,7 +21,7 @@ from circuittex.contact.law import (
     pair_penalty,
 )
 from circuittex.contact.patches import Patches, of_patches, patch_of, patches
-from circuittex.contact.transition import straight_length, strip_part
+from circuittex.contact.transition import departure, straight_length
 from circuittex.design import ContactLaw
 from circuittex.geometry.mesh import FibrilMesh
 
@@ -88,8 +88,10 @@ def _touches(mesh: FibrilMesh, law: ContactLaw, points: Points, spacing: Floats)
     R, other, E, nu = mesh.radius[a], mesh.radius[b], mesh.youngs_modulus, mesh.poisson_ratio
     modulus = effective_modulus(E[a], nu[a], E[b], nu[b])
     straight = straight_length(found.force, found.sine, R + other, pair_penalty(mesh, law, a, b))
-    part = strip_part(found.length, step, straight)
-    ellipse = hertz_ellipse(found.force, found.sine, R, other, modulus)
+    shorter, part = departure(found.length, step, straight)
+    # A touch without end has an ellipse without end; as none of it is left, any will do.
+    shorter = np.where(part < 1.0, shorter, 1.0)
+    ellipse = hertz_ellipse(found.force, found.sine, R, other, modulus).shortened(shorter)
     along = points.weight * spot_of_strip(
         np.ones(1), points.half_width, np.sqrt(mesh.radius[points.a] * mesh.radius[points.b])
     )

@@ -187,9 +187,9 @@ def read(kind: type, table: Table, *also: str) -> dict[str, Any]:
 def starter_lines(kind: type) -> str:
     """The lines of the starter design for the declared keys of a dataclass.
 
-    >>> from circuittex.design import ContactLaw
-    >>> starter_lines(ContactLaw).splitlines()[-1]
-    'heat_transfer = "0.1 W/(mm2 K)"           # h_c >= 0'
+    >>> from circuittex.design import Weave
+    >>> starter_lines(Weave).splitlines()[0]
+    'pitch = "2.5 mm"                          # between neighbouring yarn axes, in both directions'
     """
     lines = []
     for name, key in keys(kind).items():

@@ -112,6 +112,15 @@ def add_contact_law(name: str, law: Law) -> None:
     PER_TOUCH[name] = law
 
 
+def of_touches(name: str, touches: Touches) -> Floats:
+    """(P,) S by the law of a name; `DesignError` where one's own does not return that."""
+    found = np.asarray(PER_TOUCH[name](touches), dtype=np.float64)
+    if found.shape != touches.force.shape or not np.all((found >= 0.0) & (found < np.inf)):
+        wanted = f"it must return {len(touches.force)} finite conductances >= 0 S, one for each touch"
+        raise DesignError(f"contact law {name!r}", found, wanted)
+    return found
+
+
 def check_laws(law: ContactLaw) -> None:
     """Refuse a law that nobody has added here: results of another Python may name it."""
     for each in (law, *law.pairs):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.frozen import frozen
-from circuittex.contact.conductance import PER_LENGTH, PER_TOUCH, Touches
+from circuittex.contact.conductance import PER_LENGTH, Touches, of_touches
 from circuittex.contact.constriction import spot_of_ellipse, spot_of_strip
 from circuittex.contact.ellipse import hertz_ellipse
 from circuittex.contact.law import (
@@ -70,7 +70,7 @@ def conductances(mesh: FibrilMesh, law: ContactLaw, points: Points, spacing: Flo
             continue
         found, touches = _touches(mesh, law, of, spacing)
         conducts = np.minimum(mesh.electrical_conductivity[of.a], mesh.electrical_conductivity[of.b]) > 0.0
-        electrical[rows] = np.where(conducts, found.share * PER_TOUCH[name](touches)[found.patch], 0.0)
+        electrical[rows] = np.where(conducts, found.share * of_touches(name, touches)[found.patch], 0.0)
         thermal[rows] = h_c * (found.share * touches.area[found.patch])
     return electrical, thermal
 

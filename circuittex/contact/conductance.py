@@ -123,6 +123,6 @@ def of_touches(name: str, touches: Touches) -> Floats:
 
 def check_laws(law: ContactLaw) -> None:
     """Refuse a law that nobody has added here: results of another Python may name it."""
-    for each in (law, *law.pairs):
-        if each.law not in PER_LENGTH and each.law not in PER_TOUCH:
-            raise DesignError("contact.law", each.law, "the laws known here are " + ", ".join(map(repr, known())))
+    for name in law.laws:
+        if name not in PER_LENGTH and name not in PER_TOUCH:
+            raise DesignError("contact.law", name, "the laws known here are " + ", ".join(map(repr, known())))

@@ -328,6 +328,15 @@ class ContactLaw(ContactProperties):
                 raise refuse("contact.pairs", list(pair.materials), "the pair is listed twice")
             seen.add(frozenset(pair.materials))
 
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """The laws of conductance that it names.
+
+        >>> ContactLaw(5.0, 0.01, 0.1, law="holm").laws
+        ('holm',)
+        """
+        return (self.law, *(pair.law for pair in self.pairs))
+
     def between(self, one: str, other: str) -> ContactProperties:
         """The properties of the contact between two materials, by their names.
 

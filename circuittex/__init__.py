@@ -16,6 +16,7 @@ _HOMES = {
     ),
     "geometry.weave": ("build_mesh",),
     "mech.configuration": ("initial_configuration",),
+    "contact.conductance": ("add_contact_law",),
     "contact.state": ("ContactState",),
     "contact.extract": ("contact_state", "contacts_of"),
     "contact.merge": ("simplify",),
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
     from circuittex.base.errors import CircuittexError as CircuittexError
     from circuittex.base.errors import ConvergenceError as ConvergenceError
     from circuittex.base.errors import DesignError as DesignError
+    from circuittex.contact.conductance import add_contact_law as add_contact_law
     from circuittex.contact.extract import contact_state as contact_state
     from circuittex.contact.extract import contacts_of as contacts_of
     from circuittex.contact.merge import simplify as simplify

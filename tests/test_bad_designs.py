@@ -127,6 +127,9 @@ BAD: list[tuple[list[tuple[Keys, Any]], str, str]] = [
     ([(("contact", "penalty"), 0)], "contact.penalty", "> 0 N/mm2"),
     ([(("contact", "conductivity"), "0.01 S/mm")], "contact.conductivity", "in S/mm2"),
     ([(("contact", "heat_transfer"), -0.1)], "contact.heat_transfer", ">= 0 W/(mm2 K)"),
+    ([(("contact", "law"), "hollow")], "contact.law", "one of 'paper', 'strip', 'crossed', 'holm', 'film', 'power'"),
+    ([(("contact", "law"), "power")], "contact.reference_conductance", "> 0 where contact.law is 'power'"),
+    ([(("contact", "exponent"), 3)], "contact.exponent", "<= 2"),
     # loading
     ([((*LOADING, "kind"), "twist")], "loading.stretch.kind", "'uniaxial', 'biaxial', 'shear', 'path'"),
     ([((*LOADING, "kind"), MISSING)], "loading.stretch.kind", "missing"),

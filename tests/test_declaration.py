@@ -69,6 +69,13 @@ def test_a_pair_takes_from_the_rest_what_it_does_not_say() -> None:
     assert design_hash(design) != design_hash(parse_design(with_pairs()))
 
 
+def test_a_pair_has_a_law_of_its_own_or_that_of_the_rest() -> None:
+    given = with_pairs({"materials": ["fibril", "fibril"], "law": "holm"})
+    assert parse_design(given).contact.laws == ("paper", "holm")
+    given["contact"] |= {"law": "film", "pairs": [{"materials": ["fibril", "fibril"], "penalty": 5.0}]}
+    assert parse_design(given).contact.laws == ("film", "film")
+
+
 @pytest.mark.parametrize(
     ("pair", "field", "allowed"),
     [

@@ -29,7 +29,7 @@ PURE = {
     *("Verification.max_current_difference", "Verification.merge_error", "Verification.field_difference"),
     *("Verification.native_difference", "Verification.ngspice_limit"),  # V per V, or relative
     *("Verification.native_limit", "Fit.pair_errors", "Numerics.drop_fraction", "Numerics.tolerance"),
-    *("Numerics.overlap_warning", "Numerics.overlap_limit"),
+    *("Numerics.overlap_warning", "Numerics.overlap_limit", "ContactLaw.exponent", "MaterialPair.exponent"),
 }
 """Every field with pure numbers that are no counts. A field that is not here names its unit in the text below it."""
 

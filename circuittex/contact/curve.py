@@ -80,6 +80,13 @@ def bezier(table: CurveTable, r: Floats) -> Floats:
     return np.asarray(np.einsum("bp,ipc->ibc", to_bezier, power))
 
 
+def tangents(table: CurveTable, r: Floats, interval: Ints, t: Floats) -> Floats:
+    """(n, 3) derivative of the curves through nodes r (N, 3) at local coordinates t (n,) of intervals (n,)."""
+    powers = np.stack([np.zeros_like(t), np.ones_like(t), 2 * t, 3 * t**2], axis=1)
+    weight = np.einsum("nap,np->na", BASIS[table.kind[interval]], powers)
+    return np.asarray(np.einsum("na,nac->nc", weight, r[table.window[interval][:, None] + np.arange(4)]))
+
+
 @compiled
 def weights(basis: Any, t: float, derivative: int, c: Any) -> None:
     """Fill c (4,) with the weights of the window's nodes at t in [0, 1], or their first or second derivatives."""

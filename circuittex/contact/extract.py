@@ -8,17 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats
-from circuittex.contact.law import (
-    effective_modulus,
-    effective_radius,
-    hertz_width,
-    pair_conductivity,
-    pair_heat_transfer,
-    pair_penalty,
-)
+from circuittex.contact.curve import CurveTable, tangents
+from circuittex.contact.law import effective_modulus, effective_radius, hertz_width, pair_penalty
 from circuittex.contact.penalty import PenaltyContact, Touching
 from circuittex.contact.share import shares
 from circuittex.contact.state import ContactState
+from circuittex.contact.touches import Points, conductances
 from circuittex.design import ContactLaw, Design
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
@@ -35,9 +30,10 @@ def contact_state(
 ) -> ContactState:
     """The contact points of a configuration with their loads, Hertz half-widths and conductances.
 
-    p = P* o [28], a = sqrt(4 R* p / (pi E*)) [29], G = sigma_c a w [31] (0 where either fibril insulates),
-    heat conductance h_c a w [30]. A contact point has a row for each minimum of the distance, with its part of
-    the weight (`share`). `per_element` contact points an element; `conduction` is 'reference' or 'current'
+    p = P* o [28], a = sqrt(4 R* p / (pi E*)) [29], and by the paper's law G = sigma_c a w [31] (0 where either fibril
+    insulates) and heat conductance h_c a w [30]; the others are in `circuittex.contact.conductance`. A contact point
+    has a row for each minimum of the distance, with its part of the weight (`share`). `per_element` contact points an
+    element; `conduction` is 'reference' or 'current'
     (`axial_factor`).
     """
     space = beam_space(mesh)
@@ -52,20 +48,35 @@ def contact_state(
     radius = effective_radius(mesh.radius[a], mesh.radius[b])
     width = hertz_width(load, radius, effective_modulus(e[a], nu[a], e[b], nu[b]))
     weight = term.weight[a] * part
+    xi_a = (touching.interval_a - table.first_interval[a] + touching.t_a) * spacing[a]
+    xi_b = touching.position_b * spacing[b]
+    square = _sine_squared(table, term.positions(space.vector(configuration)), touching)
+    points = Points(a, b, xi_a, xi_b, load, width, weight, square)
+    electrical, thermal = conductances(mesh, law, points, 2 * term.weight)
     return ContactState(
         mesh=mesh,
         fibril_a=a,
         fibril_b=b,
-        xi_a=(touching.interval_a - table.first_interval[a] + touching.t_a) * spacing[a],
-        xi_b=touching.position_b * spacing[b],
+        xi_a=xi_a,
+        xi_b=xi_b,
         gap=-touching.overlap,
         line_load=load,
         width=width,
         weight=weight,
-        conductance=pair_conductivity(mesh, law, a, b) * width * weight,
-        heat_conductance=pair_heat_transfer(mesh, law, a, b) * width * weight,
+        conductance=electrical,
+        heat_conductance=thermal,
         axial_factor=axial_factor(space, configuration) if conduction == "current" else np.ones(len(mesh.elements)),
     )
+
+
+def _sine_squared(table: CurveTable, r: Floats, touching: Touching) -> Floats:
+    """(C,) sin^2 of the angle between the two axes."""
+    last = table.first_interval[touching.fibril_b + 1] - table.first_interval[touching.fibril_b] - 1
+    k = np.minimum(touching.position_b.astype(np.int64), last)
+    one = tangents(table, r, touching.interval_a, touching.t_a)
+    other = tangents(table, r, table.first_interval[touching.fibril_b] + k, touching.position_b - k)
+    across = (np.cross(one, other) ** 2).sum(axis=1)
+    return np.asarray(across / ((one**2).sum(axis=1) * (other**2).sum(axis=1)))
 
 
 def _take(found: Touching, rows: NDArray[np.bool_]) -> Touching:

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.design import HERTZ, ContactLaw
 from circuittex.geometry.mesh import FibrilMesh
+
+CONSTANTS = ("reference_conductance", "reference_force", "exponent")
+"""Properties of a pair that some laws of conductance take."""
 
 
 def effective_modulus(e1: Floats, nu1: Floats, e2: Floats, nu2: Floats) -> Floats:
@@ -67,6 +71,20 @@ def pair_conductivity(mesh: FibrilMesh, law: ContactLaw, a: Ints, b: Ints) -> Fl
 def pair_heat_transfer(mesh: FibrilMesh, law: ContactLaw, a: Ints, b: Ints) -> Floats:
     """h_c (C,), W/(mm2 K), of contacts between the fibrils a and b (C,)."""
     return _of_pairs(mesh, law, "heat_transfer", a, b)
+
+
+def pair_constants(mesh: FibrilMesh, law: ContactLaw, a: Ints, b: Ints) -> dict[str, Floats]:
+    """The `CONSTANTS` (C,) of contacts between the fibrils a and b (C,), by name."""
+    return {name: _of_pairs(mesh, law, name, a, b) for name in CONSTANTS}
+
+
+def pair_law(mesh: FibrilMesh, law: ContactLaw, a: Ints, b: Ints) -> NDArray[np.str_]:
+    """Name of the law of conductance (C,) of contacts between the fibrils a and b (C,)."""
+    materials = mesh.material_names or ("",)
+    table = np.array([[law.between(one, other).law for other in materials] for one in materials])
+    if not len(mesh.material):
+        return np.full(len(a), table[0, 0])
+    return np.asarray(table[mesh.material[a], mesh.material[b]])
 
 
 def _of_pairs(mesh: FibrilMesh, law: ContactLaw, name: str, a: Ints, b: Ints) -> Floats:

@@ -51,7 +51,7 @@ def merge_contacts(state: ContactState, length: float) -> ContactState:
     than 3/2 never is. Both sides of the pair are taken in.
 
     Sums are kept: conductances and weights, and weighted by them contact area (width), force (line load) and
-    gap; so G = sigma_c a w [31] still holds. The feet are means weighted by contact area. The result is
+    gap; so where G = sigma_c a w [31] it still is. The feet are means weighted by contact area. The result is
     ordered by pair and coordinate and does not depend on the order of the contacts, nor on which fibril of a
     pair is a; merging it again changes nothing.
 

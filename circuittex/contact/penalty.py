@@ -12,6 +12,7 @@ from circuittex.base.compiled import cores, side_by_side
 from circuittex.base.errors import PenetrationError
 from circuittex.base.frozen import frozen
 from circuittex.contact.closest import Fibrils, Found, find_contacts
+from circuittex.contact.conductance import check_laws
 from circuittex.contact.curve import CurveTable, curve_table, curve_through
 from circuittex.contact.hull import QUARTER, hulls
 from circuittex.contact.kernels import Rows, Sums, Touches, add_contacts
@@ -80,6 +81,7 @@ class PenaltyContact:
     def __init__(
         self, mesh: FibrilMesh, *, law: ContactLaw, per_element: int, skin: float | None = None, part: float = 1.0
     ) -> None:
+        check_laws(law)  # here, since no long work begins without
         self.mesh, self.law, self.part = mesh, law, part
         self.skin = SKIN * float(mesh.radius.min()) if skin is None else skin
         self.table: CurveTable = curve_table(mesh)

@@ -36,9 +36,9 @@ class ContactState:
     weight: Floats
     """(C,) quadrature weight w, mm of axis (already halved; of minima that belong together each has a part)."""
     conductance: Floats
-    """(C,) electrical conductance sigma_c a w [31], S."""
+    """(C,) electrical conductance by the law of the pair, the paper's is sigma_c a w [31], S."""
     heat_conductance: Floats
-    """(C,) thermal conductance h_c a w [30], W/K."""
+    """(C,) thermal conductance, h_c over the same area, by the paper's law h_c a w [30], W/K."""
     axial_factor: Floats
     """(M,) conduction of each element along its axis relative to sigma A: 1 for the paper's reference
     law, (A_now / A) / stretch where the material keeps its conductivity in the current frame."""

@@ -14,6 +14,7 @@ from math import inf
 from textwrap import wrap
 from typing import Any
 
+from circuittex.design.checks import name as checked_name
 from circuittex.design.checks import one_of, real, refuse, store, truth, whole
 from circuittex.design.table import Table, quantity
 
@@ -125,6 +126,20 @@ def choice(note: str, choices: tuple[str, ...], *, shown: str) -> Mapping[str, K
     )
 
 
+def word(note: str, words: Callable[[], tuple[str, ...]], *, shown: str) -> Mapping[str, Key]:
+    """Metadata of a field with one of `words()`, to which users may add: asked for when a file is read.
+
+    In Python any name will do: results are read where what a user once added is not known.
+
+    >>> word("which law", lambda: ("paper", "strip"), shown="paper")["key"].check("mine", "law")
+    'mine'
+    """
+    allowed = ", ".join(f'"{each}"' for each in words()) + ", or one that was added"
+    return _metadata(
+        checked_name, lambda value, field: one_of(value, field, words()), allowed, allowed, f'"{shown}"', note
+    )
+
+
 def flag(note: str, *, shown: bool) -> Mapping[str, Key]:
     """Metadata of a field that is true or false.
 
@@ -172,9 +187,9 @@ def read(kind: type, table: Table, *also: str) -> dict[str, Any]:
 def starter_lines(kind: type) -> str:
     """The lines of the starter design for the declared keys of a dataclass.
 
-    >>> from circuittex.design import ContactLaw
-    >>> starter_lines(ContactLaw).splitlines()[-1]
-    'heat_transfer = "0.1 W/(mm2 K)"           # h_c >= 0'
+    >>> from circuittex.design import Weave
+    >>> starter_lines(Weave).splitlines()[0]
+    'pitch = "2.5 mm"                          # between neighbouring yarn axes, in both directions'
     """
     lines = []
     for name, key in keys(kind).items():

@@ -8,7 +8,8 @@ from math import pi
 
 from circuittex.base.frozen import frozen, same
 from circuittex.design.checks import name, refuse, store, whole
-from circuittex.design.declaration import check, number
+from circuittex.design.contact_laws import PAPER, POWER, known
+from circuittex.design.declaration import check, number, word
 
 MOST_FIBRILS = 10_000
 """Fibrils of one yarn."""
@@ -256,6 +257,40 @@ class ContactProperties:
     """sigma_c, S/mm2."""
     heat_transfer: float = field(metadata=number("W/(mm2 K)", "h_c >= 0", shown="0.1 W/(mm2 K)", at_least=0))
     """h_c, W/(mm2 K)."""
+    law: str = field(
+        default=PAPER,
+        kw_only=True,
+        metadata=word("how its conductance follows from load and shape: the page on the model", known, shown=PAPER),
+    )
+    """The law of its conductance."""
+    reference_conductance: float = field(
+        default=0.0,
+        kw_only=True,
+        metadata=number("S", 'G0 of the law "power", G0 (F/F0)^n', shown="0 S", at_least=0),
+    )
+    """G0 of the law 'power', S: conductance of a touch under the force F0."""
+    reference_force: float = field(
+        default=0.0, kw_only=True, metadata=number("N", 'F0 of the law "power"', shown="0 N", at_least=0)
+    )
+    """F0 of the law 'power', N."""
+    exponent: float = field(
+        default=0.0,
+        kw_only=True,
+        metadata=number(
+            "1",
+            'n of the law "power": 1/3 for one elastic spot, 1/2 for a plastic one, near 1 for many',
+            shown="0.0",
+            at_least=0,
+            at_most=2,
+        ),
+    )
+    """Exponent n of the law 'power'."""
+
+    def _check(self, at: str) -> None:
+        check(self, at)
+        for key in ("reference_conductance", "reference_force", "exponent"):
+            if self.law == POWER and getattr(self, key) == 0.0:
+                raise refuse(f"{at}.{key}", getattr(self, key), f"it must be > 0 where {at}.law is {POWER!r}")
 
 
 @frozen
@@ -270,7 +305,7 @@ class MaterialPair(ContactProperties):
     """Names of the two, in any order; the same twice for a material with itself."""
 
     def __post_init__(self) -> None:
-        check(self, f"contact.pairs.{'-'.join(map(str, self.materials))}")
+        self._check(f"contact.pairs.{'-'.join(map(str, self.materials))}")
 
 
 @frozen
@@ -285,13 +320,22 @@ class ContactLaw(ContactProperties):
     """Pairs of materials with properties of their own."""
 
     def __post_init__(self) -> None:
-        check(self, "contact")
+        self._check("contact")
         store(self, pairs=tuple(self.pairs))
         seen: set[frozenset[str]] = set()
         for pair in self.pairs:
             if frozenset(pair.materials) in seen:
                 raise refuse("contact.pairs", list(pair.materials), "the pair is listed twice")
             seen.add(frozenset(pair.materials))
+
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """The laws of conductance that it names.
+
+        >>> ContactLaw(5.0, 0.01, 0.1, law="holm").laws
+        ('holm',)
+        """
+        return (self.law, *(pair.law for pair in self.pairs))
 
     def between(self, one: str, other: str) -> ContactProperties:
         """The properties of the contact between two materials, by their names.

@@ -14,7 +14,9 @@ from circuittex.base.errors import DesignError, StoreError
 from circuittex.base.lock import locked
 from circuittex.base.version import __version__
 from circuittex.base.workers import Here, Job, Pool, completed
+from circuittex.contact.conductance import check_laws
 from circuittex.design import Design, design_hash
+from circuittex.design.contact_laws import PROVIDED
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.linear import LinearSolver
@@ -60,8 +62,9 @@ def run_study(
     circuittex are left alone.
 
     Loading paths are computed beside one another by `workers` processes, by default one for each path as far as there
-    are cores; with one, in this process. The results do not depend on it. `solver` makes the linear solver of each
-    relaxation. `progress` is told in words what is being done; a line break ends what is worth keeping on the screen.
+    are cores; with one, or with a contact law of one's own, in this process. The results do not depend on it. `solver`
+    makes the linear solver of each relaxation. `progress` is told in words what is being done; a line break ends what
+    is worth keeping on the screen.
 
     With `error_estimate` the relaxed state and the last of each loading path get estimates of their discretisation
     errors, as far as they have none, each from three more relaxations (`estimate_error`). With `branches` every state
@@ -72,7 +75,10 @@ def run_study(
     folder cannot be used; `StoreError` where it cannot be written, on a full disk for example.
     """
     say = progress if progress is not None else _say_nothing
+    check_laws(design.contact)  # before an earlier run's results are removed
     count = _workers(workers)
+    if not set(design.contact.laws) <= set(PROVIDED):
+        count = 1  # other processes know nothing of what this one has added
     if error_estimate:
         variants(design)  # refuses what it must before any long work
     mesh = build_mesh(design)

@@ -16,6 +16,7 @@ from circuittex.design.files import load_design, parse_design, starter
 from circuittex.design.packing import Packing
 from circuittex.design.paper import plain_weave
 from circuittex.design.statement import Design, Electrical, Numerics, design_hash
+from circuittex.design.trade import fibril_conductivity, fibril_radius, hexagonal_rows
 
 __all__ = [
     "HERTZ",
@@ -35,6 +36,9 @@ __all__ = [
     "biaxial",
     "design_hash",
     "equal_steps",
+    "fibril_conductivity",
+    "fibril_radius",
+    "hexagonal_rows",
     "load_design",
     "load_unload",
     "parse_design",

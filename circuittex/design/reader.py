@@ -22,10 +22,11 @@ from circuittex.design.experiment import (
     shear,
     uniaxial,
 )
-from circuittex.design.fabric import ContactLaw, Material, MaterialPair, Weave, Yarn, check_draft, check_rows
+from circuittex.design.fabric import ContactLaw, MaterialPair, Weave, Yarn, check_draft
 from circuittex.design.packing import Packing
 from circuittex.design.statement import FORMAT, Design, Electrical, Numerics
-from circuittex.design.table import Table, quantity
+from circuittex.design.table import Table, choose, quantity
+from circuittex.design.yarn_table import conductivities, read_material, read_yarn
 
 MOST_STATES = 10_000
 """Recorded states of one loading."""
@@ -65,8 +66,9 @@ def read_design(mapping: object) -> Design:
     if isinstance(version, bool) or version != FORMAT:
         raise refuse("format", version, f"this version reads format = {FORMAT}")
     title = top.text("name", "a title for the design")
-    materials = _named(top, "materials", _material)
-    yarns = _named(top, "yarns", lambda value, field, label: _yarn(value, field, label, materials))
+    from_yarns = conductivities(top)
+    materials = _named(top, "materials", lambda value, field, label: read_material(value, field, label, from_yarns))
+    yarns = _named(top, "yarns", lambda value, field, label: read_yarn(value, field, label, materials))
     return Design(
         name=title,
         weave=_weave(top.get("weave", "a table [weave]"), yarns),
@@ -99,33 +101,6 @@ def _entries(top: Table, key: str) -> Iterator[tuple[object, str]]:
         yield value, f"{key}.{label}" if isinstance(label, str) and is_name(label) else f"{key}[{i}]"
 
 
-def _material(value: object, field: str, label: str) -> Material:
-    return Material(label, **read(Material, Table(value, field)))
-
-
-def _yarn(value: object, field: str, label: str, materials: Mapping[str, Material]) -> Yarn:
-    if isinstance(value, Mapping) and "spacing" in value:
-        value = {"row_spacing": value["spacing"], **value}
-    table = Table(value, field)
-    table.only(("rows", *keys(Yarn), "material", "materials"))
-    rows = check_rows(table.get("rows", "the number of fibrils in each row, such as [3, 4, 3]"), table.at("rows"))
-    numbers = read(Yarn, table, "rows", "material", "materials")
-    return Yarn(name=label, rows=rows, materials=_fibril_materials(table, sum(rows), materials), **numbers)
-
-
-def _fibril_materials(table: Table, n_fibrils: int, materials: Mapping[str, Material]) -> tuple[Material, ...]:
-    if table.has("material") and table.has("materials"):
-        raise refuse(table.at("materials"), table.value["materials"], "give either material or materials, not both")
-    if table.has("materials"):
-        wanted = f"{n_fibrils} material names, one for each fibril, row by row"
-        listed = table.items("materials", wanted)
-        if len(listed) != n_fibrils:
-            raise refuse(table.at("materials"), len(listed), f"the rows need {wanted}")
-        return tuple(_choice(item, f"{table.at('materials')}[{i}]", materials) for i, item in enumerate(listed))
-    chosen = _choice(table.get("material", "the name of a material"), table.at("material"), materials)
-    return (chosen,) * n_fibrils
-
-
 def _weave(value: object, yarns: Mapping[str, Yarn]) -> Weave:
     table = Table(value, "weave", ("draft", "warp", "weft", *keys(Weave)))
     draft = check_draft(table.get("draft", "a matrix of 0 and 1, one row for each warp yarn"), "weave.draft")
@@ -140,8 +115,8 @@ def _weave(value: object, yarns: Mapping[str, Yarn]) -> Weave:
 def _weave_yarns(table: Table, key: str, n: int, yarns: Mapping[str, Yarn]) -> tuple[Yarn, ...]:
     value = table.get(key, "the name of a yarn, or a list of names")
     if not isinstance(value, list | tuple):
-        return (_choice(value, table.at(key), yarns),) * n
-    return tuple(_choice(item, f"{table.at(key)}[{i}]", yarns) for i, item in enumerate(value))
+        return (choose(value, table.at(key), yarns),) * n
+    return tuple(choose(item, f"{table.at(key)}[{i}]", yarns) for i, item in enumerate(value))
 
 
 def _contact(value: object) -> ContactLaw:
@@ -261,9 +236,3 @@ def _probe(value: object, field: str) -> Probe:
         sink=table.text("sink", "the name of a terminal"),
         voltage=table.number("voltage", "V"),
     )
-
-
-def _choice(value: object, field: str, known: Mapping[str, _T]) -> _T:
-    if not isinstance(value, str) or value not in known:
-        raise refuse(field, value, "it must be one of " + ", ".join(map(repr, known)))
-    return known[value]

@@ -102,7 +102,7 @@ def _entries(top: Table, key: str) -> Iterator[tuple[object, str]]:
 
 
 def _weave(value: object, yarns: Mapping[str, Yarn]) -> Weave:
-    table = Table(value, "weave", ("draft", "warp", "weft", *keys(Weave)))
+    table = _with_pitches(Table(value, "weave", ("draft", "warp", "weft", "threads_per_cm", *keys(Weave))))
     draft = check_draft(table.get("draft", "a matrix of 0 and 1, one row for each warp yarn"), "weave.draft")
     return Weave(
         draft=draft,
@@ -110,6 +110,22 @@ def _weave(value: object, yarns: Mapping[str, Yarn]) -> Weave:
         weft=_weave_yarns(table, "weft", len(draft[0]), yarns),
         **read(Weave, table, "draft", "warp", "weft"),
     )
+
+
+def _with_pitches(table: Table) -> Table:
+    """The table of a weave with its pitches in place of threads per cm: one number, or one for warp and weft."""
+    if not table.has("threads_per_cm"):
+        return table
+    for key in ("pitch", "weft_pitch"):
+        if table.has(key):
+            raise refuse(table.at(key), table.value[key], "give either pitches or threads_per_cm, not both")
+    at, given = table.at("threads_per_cm"), table.value["threads_per_cm"]
+    listed = given if isinstance(given, list | tuple) else [given, given]
+    if len(listed) != 2:
+        raise refuse(at, given, "it must be one number, or two: of the warp and of the weft")
+    warp, weft = (10.0 / real(quantity(each, "1", at), at, "", above=0) for each in listed)
+    both = {"pitch": warp} if warp == weft else {"pitch": warp, "weft_pitch": weft}
+    return Table({key: entry for key, entry in table.value.items() if key != "threads_per_cm"} | both, table.field)
 
 
 def _weave_yarns(table: Table, key: str, n: int, yarns: Mapping[str, Yarn]) -> tuple[Yarn, ...]:

@@ -121,8 +121,8 @@ def weave(**changes: Any) -> Weave:
 
 
 def test_threads_per_cm_are_pitches() -> None:
-    assert weave(threads_per_cm=4) == weave(pitch="2.5 mm")
-    assert weave(threads_per_cm=[5, 4]) == weave(pitch="2 mm", weft_pitch="2.5 mm")
+    assert same(weave(threads_per_cm=4), weave(pitch="2.5 mm"))
+    assert same(weave(threads_per_cm=[5, 4]), weave(pitch="2 mm", weft_pitch="2.5 mm"))
 
 
 @pytest.mark.parametrize(

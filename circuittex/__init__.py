@@ -13,7 +13,7 @@ _HOMES = {
         *("ContactLaw", "Design", "Electrical", "Loading", "Material", "MaterialPair", "Numerics", "Packing"),
         *("Probe", "Terminal", "Weave", "Yarn", "biaxial", "design_hash", "equal_steps", "load_design", "load_unload"),
         *("fibril_conductivity", "fibril_radius", "hexagonal_rows", "parse_design", "plain_weave", "shear", "starter"),
-        "uniaxial",
+        *("touching_amplitude", "uniaxial"),
     ),
     "geometry.weave": ("build_mesh",),
     "mech.configuration": ("initial_configuration",),
@@ -81,6 +81,7 @@ if TYPE_CHECKING:
     from circuittex.design import plain_weave as plain_weave
     from circuittex.design import shear as shear
     from circuittex.design import starter as starter
+    from circuittex.design import touching_amplitude as touching_amplitude
     from circuittex.design import uniaxial as uniaxial
     from circuittex.electrical.fields import solve_fields as solve_fields
     from circuittex.electrical.network.circuit import Circuit as Circuit

@@ -16,6 +16,7 @@ from circuittex.design.files import load_design, parse_design, starter
 from circuittex.design.packing import Packing
 from circuittex.design.paper import plain_weave
 from circuittex.design.statement import Design, Electrical, Numerics, design_hash
+from circuittex.design.touching import touching_amplitude
 from circuittex.design.trade import fibril_conductivity, fibril_radius, hexagonal_rows
 
 __all__ = [
@@ -45,5 +46,6 @@ __all__ = [
     "plain_weave",
     "shear",
     "starter",
+    "touching_amplitude",
     "uniaxial",
 ]

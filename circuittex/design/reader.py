@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from math import hypot, inf
 from typing import TypeVar
 
@@ -26,6 +27,7 @@ from circuittex.design.fabric import ContactLaw, MaterialPair, Weave, Yarn, chec
 from circuittex.design.packing import Packing
 from circuittex.design.statement import FORMAT, Design, Electrical, Numerics
 from circuittex.design.table import Table, choose, quantity
+from circuittex.design.touching import AUTO, touching_amplitude
 from circuittex.design.yarn_table import conductivities, read_material, read_yarn
 
 MOST_STATES = 10_000
@@ -104,12 +106,20 @@ def _entries(top: Table, key: str) -> Iterator[tuple[object, str]]:
 def _weave(value: object, yarns: Mapping[str, Yarn]) -> Weave:
     table = _with_pitches(Table(value, "weave", ("draft", "warp", "weft", "threads_per_cm", *keys(Weave))))
     draft = check_draft(table.get("draft", "a matrix of 0 and 1, one row for each warp yarn"), "weave.draft")
-    return Weave(
-        draft=draft,
-        warp=_weave_yarns(table, "warp", len(draft), yarns),
-        weft=_weave_yarns(table, "weft", len(draft[0]), yarns),
-        **read(Weave, table, "draft", "warp", "weft"),
-    )
+    warp = _weave_yarns(table, "warp", len(draft), yarns)
+    weft = _weave_yarns(table, "weft", len(draft[0]), yarns)
+    touching = table.value.get("amplitude") == AUTO
+    if touching:
+        table = Table({**table.value, "amplitude": 0.0}, table.field)
+    stated = Weave(draft=draft, warp=warp, weft=weft, **read(Weave, table, "draft", "warp", "weft"))
+    if not touching:
+        return stated
+    if not isinstance(stated.weft_amplitude, str):
+        raise refuse(
+            table.at("weft_amplitude"), stated.weft_amplitude, f"amplitude = {AUTO!r} is of warp and weft alike"
+        )
+    height = touching_amplitude(warp, weft, *(direction.pitch for direction in stated.directions))
+    return replace(stated, amplitude=height)
 
 
 def _with_pitches(table: Table) -> Table:

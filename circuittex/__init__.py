@@ -12,7 +12,8 @@ _HOMES = {
     "design": (
         *("ContactLaw", "Design", "Electrical", "Loading", "Material", "MaterialPair", "Numerics", "Packing"),
         *("Probe", "Terminal", "Weave", "Yarn", "biaxial", "design_hash", "equal_steps", "load_design", "load_unload"),
-        *("parse_design", "plain_weave", "shear", "starter", "strain_grid", "uniaxial"),
+        *("fibril_conductivity", "fibril_radius", "hexagonal_rows", "parse_design", "plain_weave", "shear", "starter"),
+        *("strain_grid", "touching_amplitude", "uniaxial"),
     ),
     "geometry.weave": ("build_mesh",),
     "mech.configuration": ("initial_configuration",),
@@ -76,6 +77,9 @@ if TYPE_CHECKING:
     from circuittex.design import biaxial as biaxial
     from circuittex.design import design_hash as design_hash
     from circuittex.design import equal_steps as equal_steps
+    from circuittex.design import fibril_conductivity as fibril_conductivity
+    from circuittex.design import fibril_radius as fibril_radius
+    from circuittex.design import hexagonal_rows as hexagonal_rows
     from circuittex.design import load_design as load_design
     from circuittex.design import load_unload as load_unload
     from circuittex.design import parse_design as parse_design
@@ -83,6 +87,7 @@ if TYPE_CHECKING:
     from circuittex.design import shear as shear
     from circuittex.design import starter as starter
     from circuittex.design import strain_grid as strain_grid
+    from circuittex.design import touching_amplitude as touching_amplitude
     from circuittex.design import uniaxial as uniaxial
     from circuittex.electrical.fields import solve_fields as solve_fields
     from circuittex.electrical.network.circuit import Circuit as Circuit

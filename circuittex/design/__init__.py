@@ -17,6 +17,8 @@ from circuittex.design.grid import strain_grid
 from circuittex.design.packing import Packing
 from circuittex.design.paper import plain_weave
 from circuittex.design.statement import Design, Electrical, Numerics, design_hash
+from circuittex.design.touching import touching_amplitude
+from circuittex.design.trade import fibril_conductivity, fibril_radius, hexagonal_rows
 
 __all__ = [
     "HERTZ",
@@ -36,6 +38,9 @@ __all__ = [
     "biaxial",
     "design_hash",
     "equal_steps",
+    "fibril_conductivity",
+    "fibril_radius",
+    "hexagonal_rows",
     "load_design",
     "load_unload",
     "parse_design",
@@ -43,5 +48,6 @@ __all__ = [
     "shear",
     "starter",
     "strain_grid",
+    "touching_amplitude",
     "uniaxial",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import field
 from math import pi
+from typing import NamedTuple
 
 from circuittex.base.frozen import frozen, same
 from circuittex.design.checks import name, refuse, store, whole
@@ -116,6 +117,27 @@ def check_rows(rows: object, field: str) -> tuple[int, ...]:
     return checked
 
 
+SAME = "same"
+"""Stands for a length of the weft that is that of the warp."""
+
+
+class Direction(NamedTuple):
+    """The yarns of a weave that run in one direction."""
+
+    name: str
+    """'warp' or 'weft'."""
+    yarns: tuple[Yarn, ...]
+    """The kind of each."""
+    pitch: float
+    """Distance of the axes of neighbours, mm."""
+    step: float
+    """From crossing to crossing along a yarn, mm: the pitch of the yarns that it crosses."""
+    crossings: int
+    """Of each yarn."""
+    amplitude: float
+    """Height H of the axes above or below the mid-plane at a crossing, mm."""
+
+
 @frozen
 class Weave:
     """Which yarn passes over which, and how far apart they are.
@@ -130,16 +152,26 @@ class Weave:
     """The kind of each warp yarn."""
     weft: tuple[Yarn, ...]
     """The kind of each weft yarn."""
-    pitch: float = field(
-        metadata=number("mm", "between neighbouring yarn axes, in both directions", shown="2.5 mm", above=0)
-    )
-    """Distance of neighbouring yarn axes in both directions, mm."""
+    pitch: float = field(metadata=number("mm", "between the axes of neighbouring warp yarns", shown="2.5 mm", above=0))
+    """Distance of the axes of neighbouring warp yarns, mm."""
     amplitude: float = field(
         metadata=number(
-            "mm", "height H of a yarn axis above or below the mid-plane at a crossing", shown="0.46 mm", at_least=0
+            "mm", "height H of a warp axis above or below the mid-plane at a crossing", shown="0.46 mm", at_least=0
         )
     )
-    """Height H of a yarn axis above or below the mid-plane at a crossing, mm."""
+    """Height H of a warp yarn's axis above or below the mid-plane at a crossing, mm."""
+    weft_pitch: float | str = field(
+        default=SAME,
+        metadata=number(
+            "mm", 'between the axes of neighbouring weft yarns; "same": as the warp', shown=SAME, above=0, words=(SAME,)
+        ),
+    )
+    """Distance of the axes of neighbouring weft yarns, mm; 'same': as that of the warp's."""
+    weft_amplitude: float | str = field(
+        default=SAME,
+        metadata=number("mm", 'H of the weft; "same": as the warp', shown=SAME, at_least=0, words=(SAME,)),
+    )
+    """Height of a weft yarn's axis above or below the mid-plane at a crossing, mm; 'same': as that of the warp's."""
 
     def __post_init__(self) -> None:
         store(
@@ -171,34 +203,64 @@ class Weave:
 
     def _check_proportions(self) -> None:
         # Lengths against one another, so that a design of any size is judged alike.
-        for yarn in self.yarns:
-            at = f"yarns.{yarn.name}"
-            for key in ("spacing", "row_spacing"):
-                if getattr(yarn, key) > self.pitch:
-                    allowed = f"it must be at most the pitch of the weave, {self.pitch:g} mm"
-                    raise refuse(f"{at}.{key}", getattr(yarn, key), allowed)
-            if (max(yarn.rows) - 1) * yarn.spacing > self.pitch:
-                allowed = f"a row of {max(yarn.rows)} fibrils must not be wider than the pitch, {self.pitch:g} mm"
-                raise refuse(f"{at}.spacing", yarn.spacing, allowed)
-        if self.amplitude > self.pitch:
-            allowed = f"it must be at most the pitch, {self.pitch:g} mm: no yarn is as steep"
-            raise refuse("weave.amplitude", self.amplitude, allowed)
+        for direction in self.directions:
+            pitch = direction.pitch
+            for yarn in direction.yarns:
+                at = f"yarns.{yarn.name}"
+                for key in ("spacing", "row_spacing"):
+                    if getattr(yarn, key) > pitch:
+                        allowed = f"it must be at most the pitch of the weave, {pitch:g} mm"
+                        raise refuse(f"{at}.{key}", getattr(yarn, key), allowed)
+                if (max(yarn.rows) - 1) * yarn.spacing > pitch:
+                    allowed = f"a row of {max(yarn.rows)} fibrils must not be wider than the pitch, {pitch:g} mm"
+                    raise refuse(f"{at}.spacing", yarn.spacing, allowed)
         radius = min(yarn.radius for yarn in self.yarns)
-        if self.pitch > MOST_OPEN * radius:
-            allowed = f"it must be at most {MOST_OPEN * radius:g} mm, {MOST_OPEN:g} of the smallest radii"
-            raise refuse("weave.pitch", self.pitch, allowed)
+        for direction in self.directions:
+            if direction.amplitude > direction.step:
+                allowed = f"it must be at most the pitch, {direction.step:g} mm: no yarn is as steep"
+                raise refuse(self.key(direction, "amplitude"), direction.amplitude, allowed)
+            if direction.pitch > MOST_OPEN * radius:
+                allowed = f"it must be at most {MOST_OPEN * radius:g} mm, {MOST_OPEN:g} of the smallest radii"
+                raise refuse(self.key(direction, "pitch"), direction.pitch, allowed)
 
     def _check_curvature(self) -> None:
-        # The section at a crest turns inside out where R >= radius of curvature = pitch^2 / (pi^2 H).
-        radius = max(yarn.radius for yarn in self.warp + self.weft)
-        largest = self.pitch**2 / (pi**2 * radius)
-        if self.amplitude >= largest:
-            raise refuse(
-                "weave.amplitude",
-                self.amplitude,
-                f"fibrils of radius {radius:g} mm at a pitch of {self.pitch:g} mm cannot bend that far; "
-                f"it must be < {largest:.4g} mm (pitch^2 / (pi^2 radius))",
-            )
+        # The section at a crest turns inside out where R >= radius of curvature = step^2 / (pi^2 H).
+        for direction in self.directions:
+            radius = max(yarn.radius for yarn in direction.yarns)
+            largest = direction.step**2 / (pi**2 * radius)
+            if direction.amplitude >= largest:
+                raise refuse(
+                    self.key(direction, "amplitude"),
+                    direction.amplitude,
+                    f"fibrils of radius {radius:g} mm at a pitch of {direction.step:g} mm cannot bend that far; "
+                    f"it must be < {largest:.4g} mm (pitch^2 / (pi^2 radius))",
+                )
+
+    @property
+    def directions(self) -> tuple[Direction, Direction]:
+        """The warp and the weft, with the lengths of each.
+
+        >>> from circuittex.design import plain_weave
+        >>> from dataclasses import replace
+        >>> [each.step for each in replace(plain_weave().weave, weft_pitch=1.5).directions]
+        [1.5, 2.0]
+        """
+        pitch = self.pitch if isinstance(self.weft_pitch, str) else self.weft_pitch
+        amplitude = self.amplitude if isinstance(self.weft_amplitude, str) else self.weft_amplitude
+        return (
+            Direction("warp", self.warp, self.pitch, pitch, len(self.weft), self.amplitude),
+            Direction("weft", self.weft, pitch, self.pitch, len(self.warp), amplitude),
+        )
+
+    def key(self, direction: Direction, length: str) -> str:
+        """Dotted name of the key that states the 'pitch' or the 'amplitude' of a direction."""
+        own = direction.name == "weft" and getattr(self, f"weft_{length}") != SAME
+        return f"weave.weft_{length}" if own else f"weave.{length}"
+
+    @property
+    def least_pitch(self) -> float:
+        """The smaller of the distances of neighbouring yarns, mm."""
+        return min(direction.pitch for direction in self.directions)
 
     @property
     def yarns(self) -> tuple[Yarn, ...]:

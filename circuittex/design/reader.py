@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from math import hypot, inf
 from typing import TypeVar
 
@@ -22,11 +23,13 @@ from circuittex.design.experiment import (
     shear,
     uniaxial,
 )
-from circuittex.design.fabric import ContactLaw, Material, MaterialPair, Weave, Yarn, check_draft, check_rows
+from circuittex.design.fabric import ContactLaw, MaterialPair, Weave, Yarn, check_draft
 from circuittex.design.grid import AXES, strain_grid
 from circuittex.design.packing import Packing
 from circuittex.design.statement import FORMAT, Design, Electrical, Numerics
-from circuittex.design.table import Table, quantity
+from circuittex.design.table import Table, choose, quantity
+from circuittex.design.touching import AUTO, touching_amplitude
+from circuittex.design.yarn_table import conductivities, read_material, read_yarn
 
 MOST_STATES = 10_000
 """Recorded states of one loading."""
@@ -67,8 +70,9 @@ def read_design(mapping: object) -> Design:
     if isinstance(version, bool) or version != FORMAT:
         raise refuse("format", version, f"this version reads format = {FORMAT}")
     title = top.text("name", "a title for the design")
-    materials = _named(top, "materials", _material)
-    yarns = _named(top, "yarns", lambda value, field, label: _yarn(value, field, label, materials))
+    from_yarns = conductivities(top)
+    materials = _named(top, "materials", lambda value, field, label: read_material(value, field, label, from_yarns))
+    yarns = _named(top, "yarns", lambda value, field, label: read_yarn(value, field, label, materials))
     return Design(
         name=title,
         weave=_weave(top.get("weave", "a table [weave]"), yarns),
@@ -101,49 +105,46 @@ def _entries(top: Table, key: str) -> Iterator[tuple[object, str]]:
         yield value, f"{key}.{label}" if isinstance(label, str) and is_name(label) else f"{key}[{i}]"
 
 
-def _material(value: object, field: str, label: str) -> Material:
-    return Material(label, **read(Material, Table(value, field)))
-
-
-def _yarn(value: object, field: str, label: str, materials: Mapping[str, Material]) -> Yarn:
-    if isinstance(value, Mapping) and "spacing" in value:
-        value = {"row_spacing": value["spacing"], **value}
-    table = Table(value, field)
-    table.only(("rows", *keys(Yarn), "material", "materials"))
-    rows = check_rows(table.get("rows", "the number of fibrils in each row, such as [3, 4, 3]"), table.at("rows"))
-    numbers = read(Yarn, table, "rows", "material", "materials")
-    return Yarn(name=label, rows=rows, materials=_fibril_materials(table, sum(rows), materials), **numbers)
-
-
-def _fibril_materials(table: Table, n_fibrils: int, materials: Mapping[str, Material]) -> tuple[Material, ...]:
-    if table.has("material") and table.has("materials"):
-        raise refuse(table.at("materials"), table.value["materials"], "give either material or materials, not both")
-    if table.has("materials"):
-        wanted = f"{n_fibrils} material names, one for each fibril, row by row"
-        listed = table.items("materials", wanted)
-        if len(listed) != n_fibrils:
-            raise refuse(table.at("materials"), len(listed), f"the rows need {wanted}")
-        return tuple(_choice(item, f"{table.at('materials')}[{i}]", materials) for i, item in enumerate(listed))
-    chosen = _choice(table.get("material", "the name of a material"), table.at("material"), materials)
-    return (chosen,) * n_fibrils
-
-
 def _weave(value: object, yarns: Mapping[str, Yarn]) -> Weave:
-    table = Table(value, "weave", ("draft", "warp", "weft", *keys(Weave)))
+    table = _with_pitches(Table(value, "weave", ("draft", "warp", "weft", "threads_per_cm", *keys(Weave))))
     draft = check_draft(table.get("draft", "a matrix of 0 and 1, one row for each warp yarn"), "weave.draft")
-    return Weave(
-        draft=draft,
-        warp=_weave_yarns(table, "warp", len(draft), yarns),
-        weft=_weave_yarns(table, "weft", len(draft[0]), yarns),
-        **read(Weave, table, "draft", "warp", "weft"),
-    )
+    warp = _weave_yarns(table, "warp", len(draft), yarns)
+    weft = _weave_yarns(table, "weft", len(draft[0]), yarns)
+    touching = table.value.get("amplitude") == AUTO
+    if touching:
+        table = Table({**table.value, "amplitude": 0.0}, table.field)
+    stated = Weave(draft=draft, warp=warp, weft=weft, **read(Weave, table, "draft", "warp", "weft"))
+    if not touching:
+        return stated
+    if not isinstance(stated.weft_amplitude, str):
+        raise refuse(
+            table.at("weft_amplitude"), stated.weft_amplitude, f"amplitude = {AUTO!r} is of warp and weft alike"
+        )
+    height = touching_amplitude(warp, weft, *(direction.pitch for direction in stated.directions))
+    return replace(stated, amplitude=height)
+
+
+def _with_pitches(table: Table) -> Table:
+    """The table of a weave with its pitches in place of threads per cm: one number, or one for warp and weft."""
+    if not table.has("threads_per_cm"):
+        return table
+    for key in ("pitch", "weft_pitch"):
+        if table.has(key):
+            raise refuse(table.at(key), table.value[key], "give either pitches or threads_per_cm, not both")
+    at, given = table.at("threads_per_cm"), table.value["threads_per_cm"]
+    listed = given if isinstance(given, list | tuple) else [given, given]
+    if len(listed) != 2:
+        raise refuse(at, given, "it must be one number, or two: of the warp and of the weft")
+    warp, weft = (10.0 / real(quantity(each, "1", at), at, "", above=0) for each in listed)
+    both = {"pitch": warp} if warp == weft else {"pitch": warp, "weft_pitch": weft}
+    return Table({key: entry for key, entry in table.value.items() if key != "threads_per_cm"} | both, table.field)
 
 
 def _weave_yarns(table: Table, key: str, n: int, yarns: Mapping[str, Yarn]) -> tuple[Yarn, ...]:
     value = table.get(key, "the name of a yarn, or a list of names")
     if not isinstance(value, list | tuple):
-        return (_choice(value, table.at(key), yarns),) * n
-    return tuple(_choice(item, f"{table.at(key)}[{i}]", yarns) for i, item in enumerate(value))
+        return (choose(value, table.at(key), yarns),) * n
+    return tuple(choose(item, f"{table.at(key)}[{i}]", yarns) for i, item in enumerate(value))
 
 
 def _contact(value: object) -> ContactLaw:
@@ -277,9 +278,3 @@ def _probe(value: object, field: str) -> Probe:
         sink=table.text("sink", "the name of a terminal"),
         voltage=table.number("voltage", "V"),
     )
-
-
-def _choice(value: object, field: str, known: Mapping[str, _T]) -> _T:
-    if not isinstance(value, str) or value not in known:
-        raise refuse(field, value, "it must be one of " + ", ".join(map(repr, known)))
-    return known[value]

@@ -46,17 +46,19 @@ def resolution(weave: Weave, contact: ContactLaw, order: int, elements: int | No
     >>> resolution(design.weave, design.contact, 2)
     Resolution(elements=28, contact_points=11)
     """
-    pitch, slope = weave.pitch, pi * weave.amplitude / weave.pitch
-    stretch = slope**2 / 4.0
-    step, spacing = pitch / LEAST, pitch / LEAST
-    for yarn in dict.fromkeys(weave.yarns):
-        bend = yarn.radius / (2.0 * sqrt(stretch)) if stretch > 0.0 else pitch
-        step = min(step, max(bend / BENDS, 2.0 * yarn.radius))
-        for material in dict.fromkeys(yarn.materials):
-            for other in dict.fromkeys(weave.yarns):
-                for partner in dict.fromkeys(other.materials):
-                    spacing = min(spacing, _contact_length(yarn, material, other, partner, contact, slope) / POINTS)
-    longest = max(len(weave.warp), len(weave.weft)) * pitch
+    step = spacing = weave.least_pitch / LEAST
+    for direction in weave.directions:
+        slope = pi * direction.amplitude / direction.step
+        stretch = slope**2 / 4.0
+        for yarn in dict.fromkeys(direction.yarns):
+            bend = yarn.radius / (2.0 * sqrt(stretch)) if stretch > 0.0 else direction.step
+            step = min(step, max(bend / BENDS, 2.0 * yarn.radius))
+            for material in dict.fromkeys(yarn.materials):
+                for other in dict.fromkeys(weave.yarns):
+                    for partner in dict.fromkeys(other.materials):
+                        length = _contact_length(yarn, material, other, partner, contact, slope)
+                        spacing = min(spacing, length / POINTS)
+    longest = max(direction.crossings * direction.step for direction in weave.directions)
     step = step / 2.0 if order == 1 else step
     points = longest / spacing
     if elements is None:

@@ -263,7 +263,7 @@ class Design:
 
     def _check_lengths(self) -> None:
         weave, most = self.weave, self._largest_snap
-        fibril = max(len(weave.warp), len(weave.weft)) * weave.pitch
+        fibril = max(direction.crossings * direction.step for direction in weave.directions)
         if self.snap_length > most:
             allowed = f"it must be at most {most:.4g} mm, a tenth of the shortest element"
             raise refuse("numerics.snap_length", self.snap_length, allowed)
@@ -274,25 +274,25 @@ class Design:
     @property
     def _largest_snap(self) -> float:
         """A tenth of the shortest element, mm."""
-        shortest = min(len(self.weave.warp), len(self.weave.weft)) * self.weave.pitch
+        shortest = min(direction.crossings * direction.step for direction in self.weave.directions)
         return shortest / self.resolution.elements / 10
 
     @property
     def merge_length(self) -> float:
         """`Numerics.merge_length` in mm."""
         stated = self.numerics.merge_length
-        return self.weave.pitch / 2 if isinstance(stated, str) else stated
+        return self.weave.least_pitch / 2 if isinstance(stated, str) else stated
 
     @property
     def snap_length(self) -> float:
         """`Numerics.snap_length` in mm."""
         stated = self.numerics.snap_length
-        return min(self.weave.pitch / 2000, self._largest_snap) if isinstance(stated, str) else stated
+        return min(self.weave.least_pitch / 2000, self._largest_snap) if isinstance(stated, str) else stated
 
     def _check_packing(self) -> None:
         # Beyond these no random packing keeps its fibrils apart, and a twist could not be followed by the mesh.
         radius = min(yarn.radius for yarn in self.weave.yarns)
-        pitch = self.weave.pitch
+        pitch = self.weave.least_pitch
         largest = {
             "lateral": (radius, "mm, the smallest radius"),
             "vertical": (radius, "mm, the smallest radius"),

@@ -6,10 +6,12 @@ import json
 import re
 from collections.abc import Mapping
 from difflib import get_close_matches
+from typing import TypeVar
 
 from circuittex.design import units
 from circuittex.design.checks import NOTHING, refuse
 
+T = TypeVar("T")
 _BARE = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
 _LONGEST_KEY = 60  # characters shown of one
 
@@ -71,6 +73,13 @@ def quantity(value: object, unit: str, field: str) -> float:
     if not isinstance(value, int | float | str):
         raise refuse(field, value, "it must be a plain number" if unit == "1" else f"it must be a number in {unit}")
     return units.parse(value, unit, field)
+
+
+def choose(value: object, field: str, known: Mapping[str, T]) -> T:
+    """The one of known things that a text names."""
+    if not isinstance(value, str) or value not in known:
+        raise refuse(field, value, "it must be one of " + ", ".join(map(repr, known)))
+    return known[value]
 
 
 def _unknown(key: str, known: tuple[str, ...]) -> str:

@@ -33,6 +33,9 @@ _SYMBOLS: dict[str, Unit] = {
     "Ω": (Fraction(1), (2, 1, -3, -2, 0)),  # Greek capital omega
     "\u2126": (Fraction(1), (2, 1, -3, -2, 0)),  # the ohm sign
     "S": (Fraction(1), (-2, -1, 3, 2, 0)),
+    "tex": (Fraction(1, 10**6), (-1, 1, 0, 0, 0)),  # g/km
+    "dtex": (Fraction(1, 10**7), (-1, 1, 0, 0, 0)),
+    "den": (Fraction(1, 9 * 10**6), (-1, 1, 0, 0, 0)),  # g/9 km
 }
 
 _PREFIXES: dict[str, Fraction] = {

@@ -33,7 +33,8 @@ def centre_lines(weave: Weave, n_places: int, packing: Packing = Packing()) -> C
 
     r(xi3) = yarn axis(s) + lateral offset + row offset with s = xi3 - L/2. The row offset is vertical, as in
     the paper's start, so rows come closer than their spacing where the yarn rises. The natural length L is
-    that of the straight yarn, crossings x pitch; the clamped wave is longer, so fibrils start in tension.
+    that of the straight yarn, crossings times the pitch of what it crosses; the clamped wave is longer, so fibrils
+    start in tension.
     `packing` shifts the waves of the yarns and moves the fibrils within them, see `places_in_yarn`.
 
     >>> from circuittex.design import plain_weave
@@ -43,13 +44,14 @@ def centre_lines(weave: Weave, n_places: int, packing: Packing = Packing()) -> C
     fibrils = [kind.n_fibrils for kind in weave.yarns]
     yarn = np.repeat(np.arange(len(weave.yarns)), fibrils)
     along_x = yarn < len(weave.warp)
-    length = np.where(along_x, len(weave.weft), len(weave.warp)) * weave.pitch
+    warps, wefts = weave.directions
+    length = np.where(along_x, warps.crossings * warps.step, wefts.crossings * wefts.step)
     t = np.linspace(0.0, 1.0, n_places)
     xi = length[:, None] * t
     s = xi - length[:, None] / 2.0
     draws = draw(weave, packing.seed)
     offset, offset_slope = places_in_yarn(weave, packing, draws, t)
-    axes = weave.pitch * np.concatenate([centred(len(weave.warp)), centred(len(weave.weft))])
+    axes = np.concatenate([each.pitch * centred(len(each.yarns)) for each in weave.directions])
     across = axes[yarn][:, None] + offset[..., 0]
     height, slope = _axis_heights(weave, yarn, s - packing.phase * draws.phase[yarn][:, None])
     warp = along_x[:, None]
@@ -85,15 +87,15 @@ def _axis_heights(weave: Weave, yarn: Ints, s: Floats) -> tuple[Floats, Floats]:
     over: Ints = 2 * np.array(weave.draft, dtype=np.int64) - 1
     n_warp = len(weave.warp)
     split = int(np.searchsorted(yarn, n_warp))  # the warp's fibrils come first
-    warp_height, warp_slope = yarn_height(_in_crossings(s[:split], weave, over), over[yarn[:split]])
-    weft_height, weft_slope = yarn_height(_in_crossings(s[split:], weave, over.T), -over.T[yarn[split:] - n_warp])
-    slope = np.concatenate([warp_slope, weft_slope]) / weave.pitch
-    return weave.amplitude * np.concatenate([warp_height, weft_height]), weave.amplitude * slope
-
-
-def _in_crossings(s: Floats, weave: Weave, sides: Ints) -> Floats:
-    """Places along a yarn, counted in crossings from the first one."""
-    return np.asarray(s / weave.pitch + (sides.shape[1] - 1) / 2.0, dtype=np.float64)
+    heights, slopes = [], []
+    for direction, places, sides in zip(
+        weave.directions, (s[:split], s[split:]), (over[yarn[:split]], -over.T[yarn[split:] - n_warp]), strict=True
+    ):
+        from_first: Floats = places / direction.step + (direction.crossings - 1) / 2.0
+        height, slope = yarn_height(from_first, sides)
+        heights.append(direction.amplitude * height)
+        slopes.append(direction.amplitude * (slope / direction.step))
+    return np.concatenate(heights), np.concatenate(slopes)
 
 
 def _directors(across: Floats, slope: Floats, along_x: NDArray[np.bool_]) -> Floats:

@@ -67,7 +67,9 @@ def check_starting_sides(weave: Weave, packing: Packing = Packing()) -> None:  #
     wrong = f"{labels[0]} and {labels[1]} {_COUNTED} start on the wrong side of one another"
     if not packing.regular:
         raise DesignError("packing.seed", packing.seed, wrong)
-    least = max(map(_height, weave.warp)) / 4 + max(map(_height, weave.weft)) / 4
+    apart = max(map(_height, weave.warp)) / 2 + max(map(_height, weave.weft)) / 2
+    weft = weave.weft_amplitude
+    least = apart / 2 if isinstance(weft, str) else max(0.0, apart - weft)
     raise DesignError("weave.amplitude", weave.amplitude, f"{wrong}; above {least:.4g} mm their rows are apart")
 
 
@@ -151,7 +153,8 @@ def _refusal(weave: Weave, packing: Packing, yarn: Ints, f: int, g: int, excess:
         key = "spacing" if rows[0] == rows[1] else "row_spacing"
         field, value = f"yarns.{first.name}.{key}", first.spacing if key == "spacing" else first.row_spacing
     elif (yarn[f] < len(weave.warp)) == (yarn[g] < len(weave.warp)):
-        field, value = "weave.pitch", weave.pitch
+        side = weave.directions[int(yarn[f] >= len(weave.warp))]
+        field, value = weave.key(side, "pitch"), side.pitch
     else:
         field, value = "weave.amplitude", weave.amplitude
     return DesignError(

@@ -54,11 +54,10 @@ def places_in_yarn(weave: Weave, packing: Packing, draws: Draws, t: Floats) -> t
     sigma = np.array([packing.lateral, packing.vertical])
     directions = []
     # A right-handed screw turns towards the left of one who looks along the yarn: y for the warp, -x for the weft.
-    for yarns, first, crossings, left, modes in (
-        (weave.warp, 0, len(weave.weft), 1.0, draws.modes[0]),
-        (weave.weft, len(weave.warp), len(weave.warp), -1.0, draws.modes[1]),
+    for direction, first, left, modes in zip(
+        weave.directions, (0, len(weave.warp)), (1.0, -1.0), draws.modes, strict=True
     ):
-        length = crossings * weave.pitch
+        yarns, length = direction.yarns, direction.crossings * direction.step
         turns = left * packing.twist * draws.twist[first : first + len(yarns)]
         rate = 2.0 * np.pi * np.repeat(turns, [yarn.n_fibrils for yarn in yarns])
         place, slope = _turned(np.concatenate([section_offsets(yarn) for yarn in yarns]), rate, length * (t - 0.5))

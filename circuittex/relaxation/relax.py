@@ -75,7 +75,7 @@ def relax(
     start = start if start is not None else initial_configuration(mesh)
     moved = before is not None and not same(before, start)
     numerics, solver = design.numerics, solver if solver is not None else MultifrontalSolver()
-    scales = fibril_scales(space, design.weave.pitch, largest_penalty(mesh, design.contact))
+    scales = fibril_scales(space, design.weave.least_pitch, largest_penalty(mesh, design.contact))
 
     def descend(q: Floats, part: float, may_creep: bool) -> Minimum:
         contact.part, true = part, part == 1.0

@@ -177,6 +177,6 @@ def outcome_of(design: Design, mesh: FibrilMesh, equilibrium: Equilibrium) -> Ou
 
 def centre_crossing(design: Design) -> tuple[int, float]:
     """The warp yarn nearest the centre, and where along it (mm) it crosses the weft yarn nearest the centre."""
-    weave = design.weave
-    weft = (len(weave.weft) - 1) // 2
-    return (len(weave.warp) - 1) // 2, (weft - (len(weave.weft) - 1) / 2) * weave.pitch
+    warp, weft = design.weave.directions
+    middle = (len(weft.yarns) - 1) // 2
+    return (len(warp.yarns) - 1) // 2, (middle - (len(weft.yarns) - 1) / 2) * weft.pitch

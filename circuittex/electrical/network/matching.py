@@ -75,11 +75,15 @@ def groups(design: Design, *, each_crossing: bool) -> Groups:
     """The groups of a design: `each_crossing` and each direction by itself, or one for all of the same kinds."""
     weave = design.weave
     n, m = len(weave.warp), len(weave.weft)
+    warp, weft = weave.directions
+    apart = each_crossing or warp.step != weft.step  # segments of one kind have one length, or one in each direction
     names, segments = [], []
-    for yarn, direction, count in [(y, "warp", m) for y in weave.warp] + [(y, "weft", n) for y in weave.weft]:
-        siemens = sum(each.electrical_conductivity for each in yarn.materials) * np.pi * yarn.radius**2 / weave.pitch
-        names.append(f"{yarn.name} {direction}" if each_crossing else yarn.name)
-        segments.append(1.0 / siemens if siemens > 0.0 and count else np.inf)
+    for direction in (warp, weft):
+        for yarn in direction.yarns:
+            sigma = sum(each.electrical_conductivity for each in yarn.materials)
+            siemens = sigma * np.pi * yarn.radius**2 / direction.step
+            names.append(f"{yarn.name} {direction.name}" if apart else yarn.name)
+            segments.append(1.0 / siemens if siemens > 0.0 and direction.crossings else np.inf)
     conducts = np.isfinite(segments)
     yarns = tuple(dict.fromkeys(name for name, there in zip(names, conducts, strict=True) if there))
     yarn_group = np.array([yarns.index(name) if there else -1 for name, there in zip(names, conducts, strict=True)])

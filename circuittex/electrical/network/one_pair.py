@@ -81,15 +81,14 @@ def yarn_conductance(design: Design) -> float:
     >>> round(yarn_conductance(plain_weave()), 4)
     0.8836
     """
-    weave = design.weave
-    crossings = [len(weave.weft)] * len(weave.warp) + [len(weave.warp)] * len(weave.weft)
     return max(
         sum(material.electrical_conductivity for material in yarn.materials)
         * np.pi
         * yarn.radius
         * yarn.radius
-        / (count * weave.pitch)
-        for yarn, count in zip(weave.warp + weave.weft, crossings, strict=True)
+        / (direction.crossings * direction.step)
+        for direction in design.weave.directions
+        for yarn in direction.yarns
     )
 
 

@@ -28,11 +28,11 @@ def default_packing(weave: Weave, seed: int = 0) -> Packing:
     (0.0075, 0.000663)
     """
     size = SHARE * min(yarn.radius for yarn in weave.yarns)
-    length = max(len(weave.warp), len(weave.weft)) * weave.pitch
+    length = max(direction.crossings * direction.step for direction in weave.directions)
     farthest = max(float(np.hypot(*section_offsets(yarn).T).max()) for yarn in weave.yarns)
     twist = size / (np.pi * length * farthest) if farthest > 0.0 else 0.0
-    twist = min(twist, 0.25 / weave.pitch)
-    return Packing(seed=seed, lateral=size, vertical=size, twist=twist, phase=min(size, weave.pitch / 4.0))
+    twist = min(twist, 0.25 / weave.least_pitch)
+    return Packing(seed=seed, lateral=size, vertical=size, twist=twist, phase=min(size, weave.least_pitch / 4.0))
 
 
 def perturbed(design: Design, seed: int | None = None) -> Design:

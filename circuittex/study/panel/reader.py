@@ -72,12 +72,13 @@ def parse_panel(mapping: object, folder: Path) -> tuple[Panel, tuple[tuple[str, 
     return panel, _pairs(top, panel)
 
 
-def _of_results(top: Table, folder: Path) -> tuple[CellResistances, float]:
-    """Resistances and pitch of a study's cell."""
+def _of_results(top: Table, folder: Path) -> tuple[CellResistances, float | None]:
+    """Resistances and pitch of a study's cell; no pitch where warp and weft have their own."""
     table = Table(top.value["results"], "results", ("folder", "loading"))
     study = load_study(folder / table.text("folder", "the folder that 'circuittex run' has written"))
     loading = table.text("loading", "the name of a loading") if table.has("loading") else ""
-    return cells_of_study(study, loading), study.design.weave.pitch
+    warp, weft = study.design.weave.directions
+    return cells_of_study(study, loading), warp.pitch if warp.pitch == weft.pitch else None
 
 
 def _stated(top: Table, shape: tuple[int, int], pitch: float, folder: Path) -> CellResistances:

@@ -86,7 +86,7 @@ def read_image(path: Path, shape: tuple[int, int], low: float, high: float, fiel
     from matplotlib.image import imread
 
     pixels = _loaded(path, field, lambda: imread(path))
-    white = np.iinfo(pixels.dtype).max if pixels.dtype.kind == "u" else 1.0  # 255, or 65535 of a TIFF of 16 bits
+    white = 2.0 ** (8 * pixels.itemsize) - 1.0 if pixels.dtype.kind == "u" else 1.0  # 255, or 65535 of 16 bits
     grey = np.asarray(pixels, dtype=np.float64) / white
     if grey.ndim == 3:
         grey = grey[..., :3] @ _GREY if grey.shape[2] >= 3 else grey[..., 0]

@@ -16,7 +16,8 @@ from circuittex.study.library.levels import CRIMPED, Levels, levels, port_matric
 from circuittex.study.library.network import matrix_at, ports_network
 from circuittex.study.library.parts import Part
 from circuittex.study.library.rating import rated_currents
-from circuittex.study.library.reduction import Reduction, corners, exact, thin
+from circuittex.study.library.reduction import TOLERANCES, Reduction, corners, exact, thin, tolerances
+from circuittex.study.library.resistivity import at_end, differs
 from circuittex.study.library.strain_path import StrainPath, paths
 
 GOOD = 0.01
@@ -47,6 +48,15 @@ class Facts:
     """'crimped' or 'free'."""
 
     @property
+    def tolerance(self) -> tuple[float, float] | None:
+        """Largest relative fall and rise of a resistance between two pins in any state; None where none is stated."""
+        ends = [each for each in self.reductions if each.end in TOLERANCES]
+        if not ends:
+            return None
+        low, high = (compared(self.levels.ports, each.ports).worst[0] for each in ends)
+        return -low, high
+
+    @property
     def recommended(self) -> str:
         """'cell' where it errs by at most `GOOD`, else 'ports', which are exact."""
         worst = self.errors["cell"].worst if "cell" in self.errors else (np.inf,)
@@ -65,6 +75,8 @@ class Facts:
         if part.path:
             low, high = part.network.strain[[0, -1]].tolist()
             found.append(("strain", f"from {low!r} to {high!r}; beyond, the last values, and out_of_range is 1 V"))
+        if len(part.network.tc):
+            found.append(("temperature", _temperature(part)))
         return found
 
 
@@ -81,6 +93,8 @@ def facts_of(study: Study, ends: str, error: float, rise: float, members: Iterab
         errors["ports_thin"] = compared(known.ports, reductions[-1].ports)
     if packings := [port_matrices(member, ends, known.pins) for member in members]:
         reductions += corners(packings)
+    if differs(study.design, "tolerance"):
+        reductions += tolerances(*(port_matrices(study, ends, known.pins, at_end(sign)) for sign in (-1.0, 1.0)))
     ways = paths(study)
     left = {way.word: _left_out(known, way) for way in ways if len(way.strain) > 2}
     return Facts(known, tuple(reductions), ways, errors, left, rise, rated_currents(study, rise), ends)
@@ -94,6 +108,13 @@ def _left_out(known: Levels, way: StrainPath) -> Errors:
     found = [matrix_at(network, without(network.strain, network.conductance, k)) for k in inner]
     relaxed = own[int(np.argmin(np.abs(way.strain)))]
     return compared([relaxed, *own[1:-1]], [relaxed, *found])
+
+
+def _temperature(part: Part) -> str:
+    """What a part with temperature coefficients says of them."""
+    if np.isnan(part.drift):
+        return "tc1 and tc2 of each resistor, from 27 C"
+    return f"tc1 and tc2 of each resistor, from 27 C; R(T)/R(27 C) errs by {part.drift:.1e} at worst within 50 K"
 
 
 def _words(errors: Errors) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import field
 
 import networkx as nx
 import numpy as np
@@ -37,6 +38,8 @@ class Network:
     """(K,) rising; one value where strain is no input."""
     conductance: Floats
     """(K, R) S, positive."""
+    tc: Floats = field(default_factory=lambda: np.empty((0, 2)))
+    """(R, 2) temperature coefficients tc1 (1/K) and tc2 (1/K2) of each resistance; (0, 2) where there are none."""
 
 
 def ports_network(matrices: Sequence[PortMatrix], strain: Floats) -> Network:

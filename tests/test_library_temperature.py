@@ -31,7 +31,7 @@ EXACT = 1e-8
 
 def warm_study(fibril: tuple[float, float], contact: tuple[float, float], **more: float) -> Study:
     """The made-up study with coefficients in its design; its ports are those of its circuits."""
-    made = study(3)
+    made = study(2)
     weave = made.design.weave
 
     def yarns(those: tuple) -> tuple:  # type: ignore[type-arg]
@@ -69,7 +69,10 @@ def law(tc: tuple[float, float], dT: float) -> float:
 def warm(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Study]:
     folder = tmp_path_factory.mktemp("warm")
     made = warm_study(FIBRIL, CONTACT)
-    export_library(made, folder, thin=0.02)
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr("circuittex.study.library.datasheet.save_figures", lambda *_: {})
+        export_library(made, folder, dialects=("ngspice", "gnucap"))
+    assert "Resistance against temperature" in (folder / "datasheet.html").read_text("utf-8")
     return folder, made
 
 

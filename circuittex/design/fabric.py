@@ -65,8 +65,8 @@ class Material:
             at_most=STEEPEST,
         ),
     )
-    """Linear temperature coefficient of the resistivity, 1/K: times 1 + tc1 dT + tc2 dT^2,
-    dT from 27 C, SPICE's tnom."""
+    """Linear temperature coefficient of the resistivity, 1/K: times
+    1 + tc1 dT + tc2 dT^2, dT from 27 C, SPICE's tnom."""
     tc2: float = field(
         default=0.0,
         metadata=number(
@@ -295,8 +295,8 @@ class ContactProperties:
             at_most=STEEPEST,
         ),
     )
-    """Linear temperature coefficient of the resistance 1/sigma_c, 1/K: times 1 + tc1 dT + tc2 dT^2,
-    dT from 27 C, SPICE's tnom."""
+    """Linear temperature coefficient of the resistance 1/sigma_c, 1/K: times
+    1 + tc1 dT + tc2 dT^2, dT from 27 C, SPICE's tnom."""
     tc2: float = field(
         default=0.0,
         kw_only=True,

@@ -132,14 +132,14 @@ def _with_temperature(
     study: Study, known: Facts, word: str, chosen: int, ends: str, parts: Sequence[Part]
 ) -> list[Part]:
     """The parts with temperature coefficients."""
-    made = []
+    made: list[list[Part]] = []
     for kelvin in (-STEP, STEP):
         found = levels(study, ends, warmer(kelvin))
         there = replace(known, levels=found, reductions=(exact(found.ports),))
         made.append(list(_parts(study, there, word, chosen, ends, warmer(kelvin))))
     ports = {kelvin: port_matrices(study, ends, known.levels.pins, warmer(kelvin)) for kelvin in CHECKED}
     states = {path.word: path.records for path in known.paths} | {"": np.array([chosen])}
-    return with_temperature(parts, *made, ports | {0.0: known.levels.ports}, states)
+    return with_temperature(parts, made[0], made[1], ports | {0.0: known.levels.ports}, states)
 
 
 def _parts(study: Study, known: Facts, word: str, chosen: int, ends: str, factor: Factor = as_stated) -> Iterator[Part]:

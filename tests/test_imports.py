@@ -62,7 +62,7 @@ ALLOWED: dict[str, set[str]] = {
         *{"results.plot.style", "results.report.number", "results.report.page", "results.report.template"},
     },
     "study.library": {
-        *{"design", "study", "results", "results.store", "electrical.network", "netlist"},
+        *{"design", "study", "results", "results.store", "electrical.network", "netlist", "contact.state"},
         *{"results.plot.style", "results.report.number", "results.report.page", "results.report.template"},
     },
     "study.panel": {

@@ -19,6 +19,8 @@ MOST_OPEN = 1e5
 STIFFEST, HEAVIEST, MOST_CONDUCTIVE, THICKEST = 1e9, 1e6, 1e9, 1e4
 """MPa, g/mm3, S/mm and W/(mm K), mm: a thousand times and more beyond diamond, osmium, silver and a ship's rope, which
 leaves room for designs in units of another scale and none for slips of the pen."""
+STEEPEST = 0.0099
+"""1/K: with this tc1, or its square as tc2, a resistance stays positive as far as 50 K from 27 C."""
 
 
 @frozen
@@ -55,6 +57,32 @@ class Material:
         metadata=number("W/(mm K)", "k > 0", shown="1 W/(mm K)", above=0, at_most=MOST_CONDUCTIVE)
     )
     """k, W/(mm K)."""
+    tc1: float = field(
+        default=0.0,
+        metadata=number(
+            "1/K",
+            "of the resistivity, per kelvin from 27 C; for exported parts only",
+            shown="0.0",
+            at_least=-STEEPEST,
+            at_most=STEEPEST,
+        ),
+    )
+    """Linear temperature coefficient of the resistivity, 1/K: times
+    1 + tc1 dT + tc2 dT^2, dT from 27 C, SPICE's tnom."""
+    tc2: float = field(
+        default=0.0,
+        metadata=number(
+            "1/K2", "of the resistivity, per kelvin squared", shown="0.0", at_least=-(STEEPEST**2), at_most=STEEPEST**2
+        ),
+    )
+    """Quadratic temperature coefficient of the resistivity, 1/K2."""
+    tolerance: float = field(
+        default=0.0,
+        metadata=number(
+            "1", "relative, of the resistivity; for exported parts only", shown="0.0", at_least=0, at_most=0.9
+        ),
+    )
+    """Tolerance of the resistivity, relative: from 1 - tolerance to 1 + tolerance of what is stated."""
 
     def __post_init__(self) -> None:
         check(self, f"materials.{name(self.name, 'materials')}")
@@ -319,6 +347,43 @@ class ContactProperties:
     """sigma_c, S/mm2."""
     heat_transfer: float = field(metadata=number("W/(mm2 K)", "h_c >= 0", shown="0.1 W/(mm2 K)", at_least=0))
     """h_c, W/(mm2 K)."""
+    tc1: float = field(
+        default=0.0,
+        kw_only=True,
+        metadata=number(
+            "1/K",
+            "of the resistance of contacts, per kelvin from 27 C; for exported parts only",
+            shown="0.0",
+            at_least=-STEEPEST,
+            at_most=STEEPEST,
+        ),
+    )
+    """Linear temperature coefficient of the resistance 1/sigma_c, 1/K: times
+    1 + tc1 dT + tc2 dT^2, dT from 27 C, SPICE's tnom."""
+    tc2: float = field(
+        default=0.0,
+        kw_only=True,
+        metadata=number(
+            "1/K2",
+            "of the resistance of contacts, per kelvin squared",
+            shown="0.0",
+            at_least=-(STEEPEST**2),
+            at_most=STEEPEST**2,
+        ),
+    )
+    """Quadratic temperature coefficient of the resistance 1/sigma_c, 1/K2."""
+    tolerance: float = field(
+        default=0.0,
+        kw_only=True,
+        metadata=number(
+            "1",
+            "relative, of the resistance of contacts; for exported parts only",
+            shown="0.0",
+            at_least=0,
+            at_most=0.9,
+        ),
+    )
+    """Tolerance of the resistance 1/sigma_c, relative: from 1 - tolerance to 1 + tolerance of what is stated."""
     law: str = field(
         default=PAPER,
         kw_only=True,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 
 from circuittex.design import Design, Material
@@ -46,9 +48,14 @@ def build_mesh(design: Design) -> FibrilMesh:
         yarn=lines.yarn,
         length=lines.length,
         radius=np.array([kind.radius for kind in weave.yarns])[lines.yarn],
-        **{name: np.array([getattr(material, name) for material in materials]) for name in keys(Material)},
+        **{name: np.array([getattr(material, name) for material in materials]) for name in _held()},
         yarn_names=weave.yarn_names,
         yarn_axis=np.repeat([0, 1], [len(weave.warp), len(weave.weft)]),
         material=np.array([names.index(material.name) for material in materials]),
         material_names=tuple(names),
     )
+
+
+def _held() -> list[str]:
+    """The fields of a material that the mesh holds: what only exported parts use, tolerances and tc1, it does not."""
+    return [name for name in keys(Material) if name in {field.name for field in fields(FibrilMesh)}]

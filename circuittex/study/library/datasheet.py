@@ -10,6 +10,7 @@ import numpy as np
 
 from circuittex.base.arrays import Floats
 from circuittex.base.atomic import write_text
+from circuittex.electrical.network.ports import resistances
 from circuittex.results.records import Study
 from circuittex.results.report.number import number
 from circuittex.results.report.page import picture
@@ -18,7 +19,10 @@ from circuittex.study.library.accuracy import Errors
 from circuittex.study.library.cell import Cell
 from circuittex.study.library.facts import GOOD, Facts
 from circuittex.study.library.figures import save_figures
-from circuittex.study.library.network import Network
+from circuittex.study.library.network import Network, matrix_at
+from circuittex.study.library.parts import Part
+from circuittex.study.library.reduction import CORNERS
+from circuittex.study.library.resistivity import differs
 
 CAPTIONS = {
     "errors_cell": "Largest error of the cell of Ry and Rc at each pair of pins, over all states.",
@@ -30,15 +34,20 @@ NO_GRID = {
     "Two strains at once": "not available: the states under both at once were not computed (a loading of kind 'grid')"
 }
 NO_CORNERS = {"Corners and Monte Carlo": "not available: the library is made of one study, not of an ensemble"}
+NO_TEMPERATURE = {"Temperature coefficient": "not available: the design states no tc1, tc2"}
 MISSING = {
-    "Temperature coefficient": "not available: the conductivities of the design do not depend on temperature",
     "Capacitance, inductance": "not available: the model has no answer",
     "Power rating": "the rated current squared times the resistance of the probe",
 }
 
 
 def write_datasheet(
-    folder: Path, study: Study, known: Facts, cells: Sequence[Cell], networks: Mapping[str, Network]
+    folder: Path,
+    study: Study,
+    known: Facts,
+    cells: Sequence[Cell],
+    networks: Mapping[str, Network],
+    parts: Sequence[Part],
 ) -> Path:
     """Draw the figures into ``folder/figures`` and write ``folder/datasheet.html``; returns its path."""
     pictures = save_figures(known, folder / "figures")
@@ -55,12 +64,37 @@ def write_datasheet(
         cells=_cells(cells, networks),
         ratings=_ratings(study, known),
         rise=number(known.rise),
-        missing=({} if known.grids else NO_GRID) | ({} if len(known.reductions) > 2 else NO_CORNERS) | MISSING,
+        warmth=_warmth(parts),
+        missing=_missing(study, known),
         figures=[picture(CAPTIONS[name], png) for name, png in pictures.items()],
         version=study.version,
     )
     write_text(path, str(text))
     return path
+
+
+def _missing(study: Study, known: Facts) -> dict[str, str]:
+    corners = {} if any(each.end in CORNERS for each in known.reductions) else NO_CORNERS
+    corners |= {} if known.grids else NO_GRID
+    return corners | ({} if differs(study.design, "tc1", "tc2") else NO_TEMPERATURE) | MISSING
+
+
+def _warmth(parts: Sequence[Part]) -> dict[str, Any]:
+    """Resistance between the first two pins that are joined against temperature, by each part without strain."""
+    kelvin = (-50.0, -25.0, 0.0, 25.0, 50.0)
+    rows = []
+    for part in parts:
+        network = part.network
+        if len(network.tc) and not part.path and not part.end and part.level != "detailed":
+            tc1, tc2 = network.tc.T
+            warm = [network.conductance[0] / (1 + tc1 * dT + tc2 * dT**2) for dT in kelvin]
+            ohm = [resistances(matrix_at(network, each))[0] for each in warm]
+            joined = int(np.flatnonzero(np.isfinite(ohm[0]) & (ohm[0] > 0.0))[0])
+            drift = "" if np.isnan(part.drift) else f"{part.drift:.1e}"
+            pins = f"{network.pins[0]}, {network.pins[joined]}"
+            rows.append([part.name, pins, *(number(float(each[joined])) for each in ohm), drift])
+    head = ["sub-circuit", "pins", *(f"{27 + dT:g} °C (Ω)" for dT in kelvin), "error of R(T)/R(27 °C), worst"]
+    return {"head": head, "rows": rows}
 
 
 def _facts(study: Study, known: Facts) -> dict[str, str]:
@@ -80,7 +114,14 @@ def _facts(study: Study, known: Facts) -> dict[str, str]:
             ]
         )
         or "one state only: strain is no input",
-    }
+    } | _tolerance(known)
+
+
+def _tolerance(known: Facts) -> dict[str, str]:
+    if known.tolerance is None:
+        return {}
+    low, high = (number(100 * each, 3) for each in known.tolerance)
+    return {"Tolerance": f"resistances between pins lie within {low} % and +{high} % of those stated (tmin, tmax)"}
 
 
 def _range(strain: Floats) -> str:

@@ -20,6 +20,8 @@ class Dialect:
     """A behavioural source's expression, with the field `of`; empty where there are no such sources."""
     parameters: str
     """What stands before the parameters of a `.subckt` card."""
+    temperature: str
+    """The simulator's temperature in C in an expression."""
 
     def choose(self, if_: str, then: str, other: str) -> str:
         """An expression that is `then` or `other`.
@@ -33,10 +35,10 @@ class Dialect:
 DIALECTS = {
     dialect.name: dialect
     for dialect in (
-        Dialect("ngspice", "({if_} ? {then} : {other})", "{of}", ""),
-        Dialect("ltspice", "if({if_},{then},{other})", "{of}", ""),
-        Dialect("xyce", "IF({if_},{then},{other})", "{{{of}}}", "PARAMS: "),
-        Dialect("gnucap", "if({if_},{then},{other})", "", ""),
+        Dialect("ngspice", "({if_} ? {then} : {other})", "{of}", "", "temper"),
+        Dialect("ltspice", "if({if_},{then},{other})", "{of}", "", "temp"),
+        Dialect("xyce", "IF({if_},{then},{other})", "{{{of}}}", "PARAMS: ", "TEMP"),
+        Dialect("gnucap", "if({if_},{then},{other})", "", "", ""),
     )
 }
 """The programs by name. Only Xyce's manual asks for `PARAMS:`, at which other readers stop."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,11 +24,14 @@ from circuittex.study.library.dialect import DIALECTS as SYNTAX
 from circuittex.study.library.examples import crimped_probe, example_deck
 from circuittex.study.library.facts import Facts, facts_of
 from circuittex.study.library.grid_parts import grid_parts
-from circuittex.study.library.levels import CRIMPED, ENDS, FREE, detailed
+from circuittex.study.library.levels import CRIMPED, ENDS, FREE, detailed, levels, port_matrices
 from circuittex.study.library.network import Network, farthest, floating
 from circuittex.study.library.parts import Part, fixed_parts, strained_parts
+from circuittex.study.library.reduction import exact
+from circuittex.study.library.resistivity import Factor, as_stated, differs, warmer
 from circuittex.study.library.subcircuit import library_text
 from circuittex.study.library.symbols.files import write_symbols
+from circuittex.study.library.temperature import CHECKED, STEP, with_temperature
 from circuittex.study.plan import plan
 
 FORMAT = 1
@@ -64,6 +67,8 @@ def export_library(
     known = facts_of(study, ends, thin, rise, members, combine)
     word = safe_name(name) + ("_free" if ends == FREE else "")
     found = list(_parts(study, known, word, chosen, ends))
+    if differs(study.design, "tc1", "tc2"):
+        found = _with_temperature(study, known, word, chosen, ends, found)
     folder = Path(folder)
     cells = [
         _write(folder, study, known, part, dialect, chosen)
@@ -75,7 +80,7 @@ def export_library(
     _write_examples(folder / "examples", cells, networks)
     _write_probes(folder / "examples", study, chosen)
     write_symbols(folder, word, study.design.name, cells, networks)
-    write_datasheet(folder, study, known, cells, networks)
+    write_datasheet(folder, study, known, cells, networks, found)
     library = {
         "format": FORMAT,
         "circuittex": __version__,
@@ -88,6 +93,8 @@ def export_library(
         "interpolation_errors": {word: _plain(each) for word, each in known.left_out.items()},
         "cells": [asdict(cell) for cell in cells],
     }
+    if known.tolerance:
+        library["tolerance"] = dict(zip(("fall", "rise"), known.tolerance, strict=True))
     write_text(folder / "library.json", json.dumps(library, indent=1) + "\n", encoding="ascii")
     return tuple(cells)
 
@@ -125,9 +132,24 @@ def _note_missing(study: Study) -> None:
         warnings.warn(text, CircuittexWarning, stacklevel=3)
 
 
-def _parts(study: Study, known: Facts, word: str, chosen: int, ends: str) -> Iterator[Part]:
+def _with_temperature(
+    study: Study, known: Facts, word: str, chosen: int, ends: str, parts: Sequence[Part]
+) -> list[Part]:
+    """The parts with temperature coefficients."""
+    made: list[list[Part]] = []
+    for kelvin in (-STEP, STEP):
+        found = levels(study, ends, warmer(kelvin))
+        there = replace(known, levels=found, reductions=(exact(found.ports),))
+        made.append(list(_parts(study, there, word, chosen, ends, warmer(kelvin))))
+    ports = {kelvin: port_matrices(study, ends, known.levels.pins, warmer(kelvin)) for kelvin in CHECKED}
+    states = {path.word: path.records for path in known.paths} | {"": np.array([chosen])}
+    states |= {grid.word: grid.records.ravel() for grid in known.grids}
+    return with_temperature(parts, made[0], made[1], ports | {0.0: known.levels.ports}, states)
+
+
+def _parts(study: Study, known: Facts, word: str, chosen: int, ends: str, factor: Factor = as_stated) -> Iterator[Part]:
     design = study.design
-    circuit = detailed(design, study.records[chosen], ends)
+    circuit = detailed(design, study.records[chosen], ends, factor)
     yield from fixed_parts(word, design, known.levels, known.reductions, chosen, circuit)
     for path in known.paths:
         yield from strained_parts(word, design, known.levels, known.reductions, path)

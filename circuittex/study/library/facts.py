@@ -17,7 +17,8 @@ from circuittex.study.library.levels import CRIMPED, Levels, levels, port_matric
 from circuittex.study.library.network import matrix_at, ports_network
 from circuittex.study.library.parts import Part
 from circuittex.study.library.rating import rated_currents
-from circuittex.study.library.reduction import Reduction, corners, exact, thin
+from circuittex.study.library.reduction import TOLERANCES, Reduction, corners, exact, thin, tolerances
+from circuittex.study.library.resistivity import at_end, differs
 from circuittex.study.library.strain_grid import StrainGrid, grids
 from circuittex.study.library.strain_path import StrainPath, paths
 
@@ -52,6 +53,15 @@ class Facts:
     """'crimped' or 'free'."""
 
     @property
+    def tolerance(self) -> tuple[float, float] | None:
+        """Largest relative fall and rise of a resistance between two pins in any state; None where none is stated."""
+        ends = [each for each in self.reductions if each.end in TOLERANCES]
+        if not ends:
+            return None
+        low, high = (compared(self.levels.ports, each.ports).worst[0] for each in ends)
+        return -low, high
+
+    @property
     def recommended(self) -> str:
         """'cell' where it errs by at most `GOOD`, else 'ports', which are exact."""
         worst = self.errors["cell"].worst if "cell" in self.errors else (np.inf,)
@@ -72,6 +82,8 @@ class Facts:
                 low, high = axis.range
                 text = f"from {low!r} to {high!r}; beyond, the last values, and out_of_range is 1 V"
                 found.append((axis.word, text))
+        if len(part.network.tc):
+            found.append(("temperature", _temperature(part)))
         return found
 
 
@@ -99,6 +111,8 @@ def facts_of(
         errors["ports_thin"] = compared(known.ports, reductions[-1].ports)
     if packings := [port_matrices(member, ends, known.pins) for member in members]:
         reductions += corners(packings)
+    if differs(study.design, "tolerance"):
+        reductions += tolerances(*(port_matrices(study, ends, known.pins, at_end(sign)) for sign in (-1.0, 1.0)))
     ways = paths(study)
     left = {way.word: _left_out(known, way) for way in ways if len(way.strain) > 2}
     left |= {grid.word: _left_out_of_grid(known, grid) for grid in meshes if grid.records.size > 4}
@@ -128,6 +142,13 @@ def _left_out_of_grid(known: Levels, grid: StrainGrid) -> Errors:
             found.append(matrix_at(network, rest))
     relaxed = known.ports[grid.records[np.argmin(np.abs(grid.first)), np.argmin(np.abs(grid.second))]]
     return compared([relaxed, *exact], [relaxed, *found])
+
+
+def _temperature(part: Part) -> str:
+    """What a part with temperature coefficients says of them."""
+    if np.isnan(part.drift):
+        return "tc1 and tc2 of each resistor, from 27 C"
+    return f"tc1 and tc2 of each resistor, from 27 C; R(T)/R(27 C) errs by {part.drift:.1e} at worst within 50 K"
 
 
 def _words(errors: Errors) -> str:

@@ -16,6 +16,7 @@ from circuittex.electrical.network.matching import groups, match_pairs, spread
 from circuittex.electrical.network.ports import PortMatrix, port_matrix
 from circuittex.results.records import Record, Study
 from circuittex.study.export import simplified
+from circuittex.study.library.resistivity import Factor, as_stated, scaled
 
 CRIMPED, FREE = "crimped", "free"
 ENDS = (CRIMPED, FREE)
@@ -52,14 +53,14 @@ class Levels:
         return np.array([[np.median(Ry[:n]), np.median(Ry[n:]), np.median(Rc)] for Ry, Rc in rows]).reshape(-1, 3)
 
 
-def levels(study: Study, ends: str) -> Levels:
-    """The levels of all states of a study whose yarn ends are `ends`.
+def levels(study: Study, ends: str, factor: Factor = as_stated) -> Levels:
+    """The levels of all states of a study whose yarn ends are `ends`, resistivities times `factor`.
 
     Raises `CircuitError` where no state is recorded or nothing conducts between pins.
     """
     if not study.records:
         raise CircuitError("the study has no recorded state: there is nothing to export")
-    matrices = [_ports(study.design, record, ends) for record in study.records]
+    matrices = [_ports(study.design, record, ends, factor) for record in study.records]
     joined = np.any([matrix.conductance.diagonal() > 0.0 for matrix in matrices], axis=0)
     pins = tuple(name for name, there in zip(matrices[0].ports, joined, strict=True) if there)
     if not pins:
@@ -73,9 +74,9 @@ def levels(study: Study, ends: str) -> Levels:
     return Levels(pins, ports, *fit, "")
 
 
-def port_matrices(study: Study, ends: str, pins: Sequence[str]) -> tuple[PortMatrix, ...]:
-    """(S,) the exact reductions of a study to these pins."""
-    return tuple(_kept(_ports(study.design, record, ends), pins) for record in study.records)
+def port_matrices(study: Study, ends: str, pins: Sequence[str], factor: Factor = as_stated) -> tuple[PortMatrix, ...]:
+    """(S,) the exact reductions of a study to these pins, resistivities times `factor`."""
+    return tuple(_kept(_ports(study.design, record, ends, factor), pins) for record in study.records)
 
 
 def _kept(matrix: PortMatrix, pins: Sequence[str]) -> PortMatrix:
@@ -87,10 +88,11 @@ def _kept(matrix: PortMatrix, pins: Sequence[str]) -> PortMatrix:
 NO_CELL = "its pins are yarn ends whose fibrils are joined, and with free ends the pins are the terminals"
 
 
-def detailed(design: Design, record: Record, ends: str) -> Circuit:
+def detailed(design: Design, record: Record, ends: str, factor: Factor = as_stated) -> Circuit:
     """Every fibril segment and contact of one state, as the netlists of a run have it."""
     simple = simplified(design, record.contacts)
-    return build_circuit(simple.contacts, terminals(design, record, ends), dropped_contacts=simple.dropped_contacts)
+    contacts = scaled(design, simple.contacts, factor)
+    return build_circuit(contacts, terminals(design, record, ends), dropped_contacts=simple.dropped_contacts)
 
 
 def terminals(design: Design, record: Record, ends: str) -> tuple[Terminal, ...]:
@@ -98,11 +100,11 @@ def terminals(design: Design, record: Record, ends: str) -> tuple[Terminal, ...]
     return design.terminals if ends == FREE else yarn_end_terminals(record.contacts.mesh)
 
 
-def _ports(design: Design, record: Record, ends: str) -> PortMatrix:
+def _ports(design: Design, record: Record, ends: str, factor: Factor) -> PortMatrix:
     """The stored reduction where it is the one that is wanted."""
-    if ends == CRIMPED and record.ports.ports:
+    if factor is as_stated and ends == CRIMPED and record.ports.ports:
         return record.ports
-    circuit = detailed(design, record, ends)
+    circuit = detailed(design, record, ends, factor)
     found = port_matrix(circuit)
     names = [terminal.name for terminal in terminals(design, record, ends)]
     place = [names.index(name) for name in found.ports]

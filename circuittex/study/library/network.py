@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import field
 
 import networkx as nx
 import numpy as np
@@ -57,6 +58,8 @@ class Network:
     """(K, R) S, positive."""
     grid: tuple[Axis, ...] = ()
     """Where two strains are inputs, both; the states are those of their grid, row by row along the second."""
+    tc: Floats = field(default_factory=lambda: np.empty((0, 2)))
+    """(R, 2) temperature coefficients tc1 (1/K) and tc2 (1/K2) of each resistance; (0, 2) where there are none."""
 
     @property
     def axes(self) -> tuple[Axis, ...]:

@@ -51,6 +51,8 @@ class Part:
     """Word of the path or grid along which strain is an input; empty where it is none."""
     spread: tuple[Network, Network] | None = None
     """The networks at the 5th and the 95th percentile of resistance, where the place among them is a parameter."""
+    drift: float = 0.0
+    """Largest relative error of R(T)/R(27 C) between its pins within 50 K: see `temperature`."""
 
 
 def fixed_parts(

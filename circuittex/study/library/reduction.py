@@ -14,6 +14,9 @@ from circuittex.study.library.thinning import thinned
 CORNERS = {"_p05": 95.0, "_p50": 50.0, "_p95": 5.0}
 """End of a corner's name, a percentile of resistance -> that of the conductances, of all resistors at once."""
 
+TOLERANCES = {"_tmin": "lowest", "_tmax": "highest"}
+"""End of the name at an end of the tolerances -> where every resistivity is."""
+
 
 @frozen
 class Reduction:
@@ -36,6 +39,18 @@ def thin(ports: tuple[PortMatrix, ...], error: float) -> Reduction:
     """The reduction without those resistors that matter least."""
     return Reduction(
         "_thin", f"reduction to the pins, no resistance too high by more than {error:.3g}", thinned(ports, error)
+    )
+
+
+def tolerances(low: tuple[PortMatrix, ...], high: tuple[PortMatrix, ...]) -> tuple[Reduction, ...]:
+    """The reductions with the resistivities of all materials and contacts at the low and the high end of tolerance.
+
+    No combination of resistivities within the tolerances gives a resistance outside these two: raising a resistor
+    never lowers one (Rayleigh).
+    """
+    return tuple(
+        Reduction(end, f"reduction to the pins, every resistivity at the {where} of its tolerance", ports)
+        for (end, where), ports in zip(TOLERANCES.items(), (low, high), strict=True)
     )
 
 

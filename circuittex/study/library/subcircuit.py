@@ -25,6 +25,8 @@ NORMAL = 1.6448536269514722
 """The 95th percentile of the standard normal distribution."""
 FURTHEST = 3.0
 """Standard deviations beyond which the parameter mc changes nothing."""
+COLDEST = 0.01
+"""A behavioural resistance does not fall below this part of that of 27 C, however far the temperature goes."""
 OPEN = 1e9
 """ohm between the pin of strain and ground: left open it is 0."""
 
@@ -69,7 +71,25 @@ def _subcircuit(cell: Cell, network: Network, spread: tuple[Network, Network] | 
 def _fixed(network: Network) -> list[str]:
     """A resistor each."""
     ohm = (1.0 / network.conductance[0]).tolist()
-    return [f"R{name} {a} {b} {value!r}" for name, (a, b), value in zip(network.names, network.nodes, ohm, strict=True)]
+    return [
+        f"R{name} {a} {b} {value!r}{tc}"
+        for name, (a, b), value, tc in zip(network.names, network.nodes, ohm, _coefficients(network), strict=True)
+    ]
+
+
+def _coefficients(network: Network) -> list[str]:
+    """(R,) what a resistor's card says of temperature, after its value; all programs count from 27 C."""
+    if not len(network.tc):
+        return [""] * len(network.names)
+    return [f" tc1={tc1!r} tc2={tc2!r}" for tc1, tc2 in network.tc.tolist()]
+
+
+def _warmth(network: Network, dialect: Dialect) -> list[str]:
+    """(R,) what a behavioural resistor's current is divided by, kept positive; empty where there is nothing."""
+    if not len(network.tc):
+        return [""] * len(network.names)
+    dT = f"({dialect.temperature}-27)"
+    return [f"/max(1+{dT}*(({tc1!r})+{dT}*({tc2!r})),{COLDEST!r})" for tc1, tc2 in network.tc.tolist()]
 
 
 @frozen
@@ -119,8 +139,10 @@ def _by_parameter(network: Network, dialect: Dialect) -> list[str]:
     ]
     lines += [f".param {log}={{{_logarithm(known, k, known.used, dialect)}}}" for k, log in enumerate(known.logs)]
     lines += [
-        f"R{name} {a} {b} {{exp(-{known.logs[k]})}}"
-        for name, (a, b), k in zip(known.devices, network.nodes, known.own.tolist(), strict=True)
+        f"R{name} {a} {b} {{exp(-{known.logs[k]})}}{tc}"
+        for name, (a, b), k, tc in zip(
+            known.devices, network.nodes, known.own.tolist(), _coefficients(network), strict=True
+        )
     ]
     given = [axis.word for axis in known.axes]
     return [*lines, f"V{FLAG} {FLAG} 0 {{{_outside(given, known.axes, dialect)}}}"]
@@ -131,14 +153,15 @@ def _by_spread(network: Network, low: Network, high: Network, dialect: Dialect) 
     towards that of its 5th percentile (mc = -1.645) or its 95th (1.645), and straight on as far as `FURTHEST`."""
     lines = [f".param {SPREAD_USED}={{min(max({SPREAD},-{FURTHEST!r}),{FURTHEST!r})/{NORMAL!r}}}"]
     lines.append(f".param {USED}={{{_clamped(STRAIN, *network.axes)}}}")
-    for k, (name, (a, b)) in enumerate(zip(network.names, network.nodes, strict=True)):
+    cards = zip(network.names, network.nodes, _coefficients(network), strict=True)
+    for k, (name, (a, b), tc) in enumerate(cards):
         words = [f"{kind}_{k + 1}" for kind in ("middle", "low", "high")]
         for word, each in zip(words, (network, low, high), strict=True):
             own = pieces(each.strain, each.conductance[:, [k]])
             lines.append(f".param {word}={{{_log_conductance(own, 0, USED, dialect)}}}")
         middle, lower, upper = words
         share = dialect.choose(f"{SPREAD_USED}<0", f"{middle}-{lower}", f"{upper}-{middle}")
-        lines.append(f"R{name} {a} {b} {{exp(-{middle}-{SPREAD_USED}*{share})}}")
+        lines.append(f"R{name} {a} {b} {{exp(-{middle}-{SPREAD_USED}*{share})}}{tc}")
     return [*lines, f"V{FLAG} {FLAG} 0 {{{_outside([STRAIN], network.axes, dialect)}}}"]
 
 
@@ -161,9 +184,11 @@ def _by_pin(network: Network, dialect: Dialect) -> list[str]:
     volts = [f"V({used})" for used in known.used]
     lines += [source(log, log, "0", "V", _logarithm(known, k, volts, dialect)) for k, log in enumerate(known.logs)]
     bounds = known.pieces.bounds.T.tolist()
-    for name, (a, b), k in zip(known.devices, network.nodes, known.own.tolist(), strict=True):
+    rows = zip(known.devices, network.nodes, known.own.tolist(), _warmth(network, dialect), strict=True)
+    for name, (a, b), k, warmth in rows:
         low, high = bounds[k]
-        lines.append(source(name, a, b, "I", f"V({a},{b})*exp(min(max(V({known.logs[k]}),{low!r}),{high!r}))"))
+        current = f"V({a},{b})*exp(min(max(V({known.logs[k]}),{low!r}),{high!r})){warmth}"
+        lines.append(source(name, a, b, "I", current))
     given = [f"V({axis.word})" for axis in known.axes]
     return [*lines, source(FLAG, FLAG, "0", "V", _outside(given, known.axes, dialect))]
 

@@ -1,0 +1,74 @@
+"""The same contacts with other resistivities: those of a temperature, or of the ends of a tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from circuittex.contact.state import ContactState
+from circuittex.design import ContactLaw, Design, Material
+from circuittex.design.fabric import ContactProperties
+
+Factor = Callable[[Material | ContactProperties], float]
+"""What the resistivity of a material, or 1/sigma_c of a contact, is multiplied by."""
+
+
+def as_stated(each: Material | ContactProperties) -> float:
+    """The resistivity of the design."""
+    return 1.0
+
+
+def warmer(kelvin: float) -> Factor:
+    """1 + tc1 dT + tc2 dT^2, dT from 27 C.
+
+    >>> warmer(50.0)(Material("silver", 10.0, 0.0, 1.0, 10.0, 1.0, tc1=0.004, tc2=1e-6))
+    1.2025
+    """
+    return lambda each: 1.0 + each.tc1 * kelvin + each.tc2 * kelvin**2
+
+
+def at_end(sign: float) -> Factor:
+    """1 + tolerance or 1 - tolerance."""
+    return lambda each: 1.0 + sign * each.tolerance
+
+
+def differs(design: Design, *names: str) -> bool:
+    """Whether any material or contact of a design states one of these fields.
+
+    >>> from circuittex.design import plain_weave
+    >>> differs(plain_weave(), "tc1", "tc2")
+    False
+    """
+    stated = [*_materials(design), design.contact, *design.contact.pairs]
+    return any(getattr(each, name) != 0.0 for each in stated for name in names)
+
+
+def scaled(design: Design, contacts: ContactState, factor: Factor) -> ContactState:
+    """The contacts with the resistivity of each fibril and each contact times its factor."""
+    if factor is as_stated:
+        return contacts
+    materials = _materials(design)
+    mesh = contacts.mesh
+    along = np.array([factor(each) for each in materials])
+    across = np.array(
+        [
+            factor(_between(design.contact, materials[a], materials[b]))
+            for a, b in zip(contacts.fibril_a.tolist(), contacts.fibril_b.tolist(), strict=True)
+        ]
+    )
+    return replace(
+        contacts,
+        mesh=replace(mesh, electrical_conductivity=mesh.electrical_conductivity / along),
+        conductance=contacts.conductance / across,
+    )
+
+
+def _between(law: ContactLaw, one: Material, other: Material) -> ContactProperties:
+    return law.between(one.name, other.name)
+
+
+def _materials(design: Design) -> list[Material]:
+    """(F,) of the fibrils in the order of the mesh."""
+    return [each for yarn in (*design.weave.warp, *design.weave.weft) for each in yarn.materials]

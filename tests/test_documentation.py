@@ -210,6 +210,8 @@ def test_part_of_a_design(page: str, text: str, small: str, tmp_path: Path) -> N
             "pull-x0p1-y",
         ]
         return
+    if page == "design.md":  # a yarn that this weave does not use: that it is read is all
+        return
     assert page == "ensemble.md"
     assert design.packing.lateral == pytest.approx(0.0075), "7.5 um in mm"
 

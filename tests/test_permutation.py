@@ -9,10 +9,9 @@ import pytest
 from fabrics import small_cell
 
 from circuittex.base.frozen import same
-from circuittex.design import Material
-from circuittex.design.declaration import keys
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.permutation import permuted
+from circuittex.geometry.weave import material_fields
 
 
 def uneven() -> FibrilMesh:
@@ -40,7 +39,7 @@ def parts(mesh: FibrilMesh, fibril: int) -> tuple[np.ndarray | float, ...]:
     nodal = (getattr(mesh, name)[first:last] for name in ("position", "directors", "xi"))
     elements = mesh.elements[mesh.first_element[fibril] : mesh.first_element[fibril + 1]] - first
     tables = [f.name for f in fields(mesh) if getattr(getattr(mesh, f.name), "shape", ()) == (mesh.n_fibrils,)]
-    assert len(tables) == 3 + len(keys(Material)) + 1
+    assert len(tables) == 3 + len(material_fields()) + 1
     return (*nodal, elements, *(getattr(mesh, name)[fibril] for name in tables))
 
 

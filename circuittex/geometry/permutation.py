@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from circuittex.base.arrays import Ints
-from circuittex.design import Material
-from circuittex.design.declaration import keys
 from circuittex.geometry.mesh import FibrilMesh
+from circuittex.geometry.weave import material_fields
 
 
 def permuted(mesh: FibrilMesh, permutation: Ints) -> tuple[FibrilMesh, Ints]:
@@ -28,7 +27,7 @@ def permuted(mesh: FibrilMesh, permutation: Ints) -> tuple[FibrilMesh, Ints]:
     nodes = np.concatenate([np.arange(mesh.first_node[f], mesh.first_node[f + 1]) for f in permutation])
     old = np.concatenate([np.arange(mesh.first_element[f], mesh.first_element[f + 1]) for f in permutation])
     place = np.argsort(nodes)
-    tables = ["yarn", "length", "radius", *keys(Material), *(["material"] if len(mesh.material) else [])]
+    tables = ["yarn", "length", "radius", *material_fields(), *(["material"] if len(mesh.material) else [])]
     other = replace(
         mesh,
         position=mesh.position[nodes],

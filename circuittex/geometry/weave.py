@@ -48,7 +48,7 @@ def build_mesh(design: Design) -> FibrilMesh:
         yarn=lines.yarn,
         length=lines.length,
         radius=np.array([kind.radius for kind in weave.yarns])[lines.yarn],
-        **{name: np.array([getattr(material, name) for material in materials]) for name in _held()},
+        **{name: np.array([getattr(material, name) for material in materials]) for name in material_fields()},
         yarn_names=weave.yarn_names,
         yarn_axis=np.repeat([0, 1], [len(weave.warp), len(weave.weft)]),
         material=np.array([names.index(material.name) for material in materials]),
@@ -56,6 +56,6 @@ def build_mesh(design: Design) -> FibrilMesh:
     )
 
 
-def _held() -> list[str]:
+def material_fields() -> list[str]:
     """The fields of a material that the mesh holds: what only exported parts use, tolerances and tc1, it does not."""
     return [name for name in keys(Material) if name in {field.name for field in fields(FibrilMesh)}]

@@ -15,9 +15,20 @@ from synthetic_study import synthetic_study
 from circuittex.base.errors import ConvergenceError, PenetrationError
 from circuittex.contact.extract import contact_state
 from circuittex.design import ContactLaw, Design, biaxial, equal_steps
-from circuittex.mech.configuration import initial_configuration
+from circuittex.geometry.mesh import FibrilMesh
+from circuittex.mech.beam import Beam
+from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.space import beam_space
 from circuittex.results.records import Record, Study
-from circuittex.results.soundness import HOT, deepest_overlap, doubt_statement, doubts, section_stress, strength
+from circuittex.results.soundness import (
+    HOT,
+    deepest_overlap,
+    doubt_statement,
+    doubts,
+    section_stress,
+    strength,
+    surface_stress,
+)
 from circuittex.results.store import load_study
 from circuittex.results.summary import summary, table
 from circuittex.study.plan import plan
@@ -31,8 +42,18 @@ def quiet(record: Record, **changes: object) -> Record:
     """The record with overlaps, forces and temperatures that nobody doubts, but for what is changed."""
     contacts = replace(record.contacts, gap=np.full(record.contacts.n_contacts, -0.01))
     fields = tuple(replace(field, peak_temperature=1.0) for field in record.fields)
-    calm = replace(record, contacts=contacts, fields=fields, section_force=0.0 * record.section_force)
+    rest = unbent(contacts.mesh)
+    calm = replace(
+        record, contacts=contacts, fields=fields, configuration=rest, section_force=0.0 * record.section_force
+    )
     return replace(calm, **changes)
+
+
+def unbent(mesh: FibrilMesh) -> Configuration:
+    """Every fibril straight along x."""
+    x = np.zeros((mesh.n_nodes, 3, 3))
+    x[:, 0, 0], x[:, 1, 1], x[:, 2, 2] = mesh.xi, 1.0, 1.0
+    return Configuration(x)
 
 
 def study_of(*records: Record) -> Study:
@@ -70,6 +91,57 @@ def test_the_stress_is_the_force_over_the_reference_area() -> None:
     np.testing.assert_allclose(section_stress(pulled), 3.0, rtol=1e-14)
 
 
+@pytest.mark.parametrize("plane", [0.0, 0.7])
+def test_bending_to_a_circle_stresses_the_surface(plane: float) -> None:
+    """E R / rho, whatever the directors' turn about the axis; tension adds to it."""
+    record = quiet(STUDY.records[0])
+    mesh = record.contacts.mesh
+    rho, fibril = 3.0, mesh.element_fibril
+    angle, zero = mesh.xi / rho, 0.0 * mesh.xi
+    inwards = np.stack([-np.sin(angle), np.cos(angle), zero], axis=1)
+    across = np.broadcast_to([0.0, 0.0, 1.0], inwards.shape)
+    r = rho * np.stack([np.sin(angle), 1.0 - np.cos(angle), zero], axis=1)
+    g1 = np.cos(plane) * inwards + np.sin(plane) * across
+    g2 = -np.sin(plane) * inwards + np.cos(plane) * across
+    bent = replace(record, configuration=Configuration(np.stack([r, g1, g2], axis=1)))
+    known = (mesh.youngs_modulus * mesh.radius / rho)[fibril]
+    # The chord of an element of angle a is a^2 / 24 shorter than its arc.
+    arc = np.abs(np.diff(mesh.xi[mesh.elements[:, [0, -1]]], axis=1)).max() / rho
+    assert arc**2 / 24 < 0.01
+    np.testing.assert_allclose(surface_stress(bent), known, rtol=1.01 * arc**2 / 24)
+    pulled = replace(bent, section_force=2.0 * mesh.area[fibril])
+    np.testing.assert_allclose(surface_stress(pulled), surface_stress(bent) + 2.0, rtol=1e-14)
+
+
+def test_a_stretched_fibril_is_not_bent() -> None:
+    """E epsilon at its surface, up to the next order in epsilon; the force is that of the beam."""
+    record, strain = quiet(STUDY.records[0]), 1e-4
+    mesh = record.contacts.mesh
+    x = np.array(unbent(mesh).x)
+    x[:, 0, 0] *= 1.0 + strain
+    nu = mesh.poisson_ratio[mesh.node_fibril][:, None, None]
+    x[:, 1:] *= 1.0 - nu * strain
+    space = beam_space(mesh)
+    force = np.linalg.norm(Beam(space).section_force(x.ravel()), axis=1)
+    stretched = replace(record, configuration=Configuration(x), section_force=force)
+    np.testing.assert_allclose(surface_stress(stretched), strain * mesh.youngs_modulus[mesh.element_fibril], rtol=1e-3)
+
+
+def test_bending_alone_is_reason_to_doubt() -> None:
+    """Nylon of 3 GPa in a circle of radius 4 R: E R / rho is a quarter of E, of which no fibre bears a fifth."""
+    record = quiet(STUDY.records[0])
+    mesh = replace(record.contacts.mesh, youngs_modulus=np.full(record.contacts.mesh.n_fibrils, 3e3))
+    record = replace(record, contacts=replace(record.contacts, mesh=mesh))
+    rho = 4.0 * mesh.radius[mesh.node_fibril]
+    angle, x = mesh.xi / rho, np.array(record.configuration.x)
+    x[:, 1] = np.stack([-np.sin(angle), np.cos(angle), 0.0 * angle], axis=1)
+    x[:, 0] = rho[:, None] * np.stack([np.sin(angle), 1.0 - np.cos(angle), 0.0 * angle], axis=1)
+    assert doubts(study_of(record), record) == ()
+    (doubt,) = doubts(study_of(record), replace(record, configuration=Configuration(x)))
+    assert doubt.kind == "stress"
+    assert "bending included" in doubt.text
+
+
 def test_no_known_fibre_is_stronger_than_the_limit() -> None:
     """Modulus and strength, MPa, of the strongest of their kind: handbooks' values, rounded up."""
     fibres = {
@@ -104,7 +176,9 @@ def test_every_kind_of_doubt_names_state_value_and_reason() -> None:
     study = study_of(overlapping(first, 0.31), pulled, quiet(third, fields=hot))
     overlap, tension, heat = doubt_statement(study)
     assert overlap.startswith(f"Do not trust {first.name}: fibrils overlap by 0.31 of R + R' (warned of from 0.3 on")
-    assert tension.startswith(f"Do not trust {second.name}: the stress reaches 200 MPa in warp1: no material of")
+    assert tension.startswith(
+        f"Do not trust {second.name}: the stress reaches 200 MPa, bending included, in warp1: no material of"
+    )
     assert "more than 10 MPa" in tension
     assert heat.startswith(f"Do not trust {third.name}: the temperature rises by up to 1e+04 K")
     assert "no heat is lost to the air" in heat

@@ -8,6 +8,8 @@ from numbers import Real
 from operator import index
 from typing import Any, SupportsIndex
 
+import numpy as np
+
 from circuittex.base.errors import DesignError
 
 _NAME_RULE = "a name is a letter followed by at most 39 letters, digits, '_' or '-' (ASCII)"
@@ -24,8 +26,11 @@ def refuse(field: str, value: object, allowed: str) -> DesignError:
     >>> str(refuse("weave.pitch", -1.0, "it must be > 0 mm"))
     'weave.pitch: -1.0 is not usable; it must be > 0 mm'
     """
-    if len(repr(value)) > _LONGEST_VALUE:
-        value = _Shown(repr(value)[:_LONGEST_VALUE] + "...")
+    text = " ".join(repr(value).splitlines())  # an array's has several lines
+    if len(text) > _LONGEST_VALUE:
+        value = _Shown(text[:_LONGEST_VALUE] + "...")
+    elif text != repr(value):
+        value = _Shown(text)
     return DesignError(field, value, allowed)
 
 
@@ -77,7 +82,10 @@ def whole(value: object, field: str, at_least: int, at_most: int) -> int:
     allowed = f"it must be a whole number from {at_least} to {at_most}"
     if isinstance(value, bool) or not isinstance(value, SupportsIndex):
         raise refuse(field, value, allowed)
-    number = index(value)
+    try:
+        number = index(value)
+    except TypeError:  # an array has __index__, too, but may not be one whole number
+        raise refuse(field, value, allowed) from None
     if not at_least <= number <= at_most:
         raise refuse(field, value, allowed)
     return number
@@ -135,6 +143,47 @@ def truth(value: object, field: str) -> bool:
     if not isinstance(value, bool):
         raise refuse(field, value, "it must be true or false")
     return value
+
+
+def sequence(value: object, field: str, wanted: str) -> tuple[Any, ...]:
+    """The items of a list, a tuple or a NumPy array, in which arrays are as deep tuples; `wanted` says of what.
+
+    A generator or a set has no order or no second reading, and the letters of a text are not its items.
+
+    >>> sequence(np.eye(2, dtype=int), "weave.draft", "rows of 0 and 1")
+    ((1, 0), (0, 1))
+    """
+    if isinstance(value, np.ndarray) and value.ndim:
+        items: list[object] = value.tolist()
+        return tuple(map(_deep, items))
+    if not isinstance(value, list | tuple):
+        raise refuse(field, value, f"it must be a list or tuple of {wanted}")
+    return tuple(value)
+
+
+def _deep(item: object) -> object:
+    return tuple(map(_deep, item)) if isinstance(item, list) else item
+
+
+def instances(value: object, field: str, kind: type, wanted: str) -> tuple[Any, ...]:
+    """The items of a sequence, each of which must be a `kind`.
+
+    >>> instances([1, 2], "rows", int, "whole numbers")
+    (1, 2)
+    """
+    items = sequence(value, field, wanted)
+    for i, item in enumerate(items):
+        instance(item, f"{field}[{i}]", kind)
+    return items
+
+
+def instance(value: object, field: str, kind: type) -> None:
+    """Refuse what is no `kind`.
+
+    >>> instance("silver", "name", str)
+    """
+    if not isinstance(value, kind):
+        raise refuse(field, value, f"it must be a {kind.__name__}")
 
 
 def distinct(names: tuple[str, ...], field: str) -> None:

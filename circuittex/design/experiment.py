@@ -6,14 +6,18 @@ from collections.abc import Sequence
 from fractions import Fraction
 from math import hypot, inf
 
+import numpy as np
+
 from circuittex.base.frozen import frozen
-from circuittex.design.checks import name, one_of, real, refuse, store
+from circuittex.design.checks import instance, name, one_of, real, refuse, sequence, store, whole
 
 Gradient = tuple[tuple[float, float], tuple[float, float]]
 """In-plane deformation gradient ((Fxx, Fxy), (Fyx, Fyy))."""
 REST: Gradient = ((1.0, 0.0), (0.0, 1.0))
 LEAST_STRETCH, MOST_STRETCH = 0.1, 5.0
 """Principal stretches of the cell: no fabric is stretched or crushed further, and no model of one would hold."""
+MOST_STATES = 10_000
+"""Recorded states of one loading."""
 HIGHEST_VOLTAGE = 1e5
 """V: in air, sparks leap over a cell long before."""
 
@@ -40,16 +44,16 @@ class Loading:
 
     def __post_init__(self) -> None:
         at = f"loading.{name(self.name, 'loading.name')}"
-        if not self.gradients:
+        gradients = sequence(self.gradients, f"{at}.gradients", "matrices [[Fxx, Fxy], [Fyx, Fyy]]")
+        strains = check_strains(self.strains, f"{at}.strains")
+        if not gradients:
             raise refuse(f"{at}.gradients", self.gradients, "at least one state is needed")
-        if len(self.strains) != len(self.gradients):
-            raise refuse(
-                f"{at}.strains", len(self.strains), f"{len(self.gradients)} gradients need one strain each as a label"
-            )
+        if len(strains) != len(gradients):
+            raise refuse(f"{at}.strains", len(strains), f"{len(gradients)} gradients need one strain each as a label")
         store(
             self,
-            gradients=tuple(check_gradient(F, f"{at}.gradients[{i}]") for i, F in enumerate(self.gradients)),
-            strains=tuple(real(e, f"{at}.strains[{i}]") for i, e in enumerate(self.strains)),
+            gradients=tuple(check_gradient(F, f"{at}.gradients[{i}]") for i, F in enumerate(gradients)),
+            strains=strains,
             start=check_gradient(self.start, f"{at}.start"),
         )
         check_free_edges(self.free, self.gradients, f"{at}.free")
@@ -61,9 +65,10 @@ def uniaxial(name: str, strains: Sequence[float], axis: str = "x", free: str = "
     >>> uniaxial("stretch", equal_steps(0.1, 4)).gradients[3]
     ((1.1, 0.0), (0.0, 1.0))
     """
+    strains = check_strains(strains, f"loading.{name}.strains")
     along_x = one_of(axis, f"loading.{name}.axis", ("x", "y")) == "x"
     gradients = tuple(((1.0 + e, 0.0), (0.0, 1.0)) if along_x else ((1.0, 0.0), (0.0, 1.0 + e)) for e in strains)
-    return Loading(name, gradients, tuple(strains), free)
+    return Loading(name, gradients, strains, free)
 
 
 def biaxial(name: str, strains: Sequence[float]) -> Loading:
@@ -72,7 +77,8 @@ def biaxial(name: str, strains: Sequence[float]) -> Loading:
     >>> biaxial("swell", [0.5]).gradients
     (((1.5, 0.0), (0.0, 1.5)),)
     """
-    return Loading(name, tuple(((1.0 + e, 0.0), (0.0, 1.0 + e)) for e in strains), tuple(strains))
+    strains = check_strains(strains, f"loading.{name}.strains")
+    return Loading(name, tuple(((1.0 + e, 0.0), (0.0, 1.0 + e)) for e in strains), strains)
 
 
 def shear(name: str, strains: Sequence[float], free: str = "") -> Loading:
@@ -81,7 +87,8 @@ def shear(name: str, strains: Sequence[float], free: str = "") -> Loading:
     >>> shear("shear", [0.25]).gradients
     (((1.0, 0.0), (0.25, 1.0)),)
     """
-    return Loading(name, tuple(((1.0, 0.0), (g, 1.0)) for g in strains), tuple(strains), free)
+    strains = check_strains(strains, f"loading.{name}.strains")
+    return Loading(name, tuple(((1.0, 0.0), (g, 1.0)) for g in strains), strains, free)
 
 
 def load_unload(loading: Loading) -> Loading:
@@ -90,6 +97,7 @@ def load_unload(loading: Loading) -> Loading:
     >>> load_unload(uniaxial("cycle", (0.05, 0.1))).strains
     (0.05, 0.1, 0.05, 0.0)
     """
+    instance(loading, "loading", Loading)
     gradients = (*loading.gradients, *loading.gradients[-2::-1], REST)
     return Loading(loading.name, gradients, (*loading.strains, *loading.strains[-2::-1], 0.0), loading.free)
 
@@ -100,8 +108,18 @@ def equal_steps(strain: float, steps: int) -> tuple[float, ...]:
     >>> equal_steps(0.1, 4)
     (0.025, 0.05, 0.075, 0.1)
     """
-    exact = Fraction(repr(strain))
+    exact = Fraction(repr(real(strain, "strain")))
+    steps = whole(steps, "steps", 1, MOST_STATES)
     return tuple(float(exact * i / steps) for i in range(1, steps + 1))
+
+
+def check_strains(strains: object, field: str) -> tuple[float, ...]:
+    """The strains that label the states of a loading.
+
+    >>> check_strains([0.05, 0.1], "loading.stretch.strains")
+    (0.05, 0.1)
+    """
+    return tuple(real(e, f"{field}[{i}]") for i, e in enumerate(sequence(strains, field, "numbers")))
 
 
 def check_free_edges(free: str, gradients: Sequence[Gradient], field: str) -> None:
@@ -124,11 +142,14 @@ def check_gradient(gradient: object, field: str) -> Gradient:
     ((1.1, 0.0), (0.0, 1.0))
     """
     shape = "it must be a matrix [[Fxx, Fxy], [Fyx, Fyy]]"
+    if isinstance(gradient, np.ndarray):
+        gradient = gradient.tolist()
     if not isinstance(gradient, list | tuple) or len(gradient) != 2:
         raise refuse(field, gradient, shape)
-    if any(not isinstance(row, list | tuple) or len(row) != 2 for row in gradient):
+    rows = [row.tolist() if isinstance(row, np.ndarray) else row for row in gradient]
+    if any(not isinstance(row, list | tuple) or len(row) != 2 for row in rows):
         raise refuse(field, gradient, shape)
-    (xx, xy), (yx, yy) = (tuple(real(v, f"{field}[{i}]") for v in row) for i, row in enumerate(gradient))
+    (xx, xy), (yx, yy) = (tuple(real(v, f"{field}[{i}]") for v in row) for i, row in enumerate(rows))
     if not 0.0 < xx * yy - xy * yx < inf:
         raise refuse(field, gradient, "its determinant must be > 0 (no area may vanish or turn over)")
     # Sum and difference of the two principal stretches.
@@ -155,17 +176,21 @@ class Terminal:
 
     def __post_init__(self) -> None:
         at = f"terminals.{name(self.name, 'terminals')}"
-        if not self.ends:
+        wanted = "yarn ends such as ('warp2', +1)"
+        ends = [sequence(end, at, "a yarn's name and a side, -1 or +1") for end in sequence(self.ends, at, wanted)]
+        if not ends:
             raise refuse(at, [], "it must list at least one yarn end, such as 'warp2+'")
-        seen: set[tuple[str, int]] = set()
-        for yarn, side in self.ends:
-            label = f"{yarn}{'+' if side > 0 else '-'}"
-            if side not in (-1, 1):
-                raise refuse(at, side, "the side of a yarn end must be -1 or +1")
+        seen: dict[tuple[str, int], None] = {}
+        for end in ends:
+            if len(end) != 2:
+                raise refuse(at, end, f"it must list {wanted}")
+            yarn, side = name(end[0], at), int(real(end[1], at))
+            if end[1] not in (-1, 1):
+                raise refuse(at, end[1], "the side of a yarn end must be -1 or +1")
             if (yarn, side) in seen:
-                raise refuse(at, label, "it is listed twice")
-            seen.add((yarn, side))
-        store(self, ends=tuple((yarn, int(side)) for yarn, side in self.ends))
+                raise refuse(at, f"{yarn}{'+' if side > 0 else '-'}", "it is listed twice")
+            seen[yarn, side] = None
+        store(self, ends=tuple(seen))
 
 
 @frozen
@@ -190,6 +215,7 @@ class Probe:
         store(
             self, voltage=real(self.voltage, f"{at}.voltage", "V", at_least=-HIGHEST_VOLTAGE, at_most=HIGHEST_VOLTAGE)
         )
+        store(self, source=name(self.source, f"{at}.source"), sink=name(self.sink, f"{at}.sink"))
         if self.voltage == 0.0:
             raise refuse(f"{at}.voltage", self.voltage, "it must not be 0 V, or no current flows")
         if self.source == self.sink:

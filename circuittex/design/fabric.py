@@ -8,7 +8,7 @@ from math import pi
 from typing import NamedTuple
 
 from circuittex.base.frozen import frozen, same
-from circuittex.design.checks import name, refuse, store, whole
+from circuittex.design.checks import instances, name, refuse, sequence, store, whole
 from circuittex.design.contact_laws import PAPER, POWER, known
 from circuittex.design.declaration import check, number, word
 
@@ -119,11 +119,12 @@ class Yarn:
     def __post_init__(self) -> None:
         at = f"yarns.{name(self.name, 'yarns')}"
         rows = check_rows(self.rows, f"{at}.rows")
-        if len(self.materials) != sum(rows):
+        materials = instances(self.materials, f"{at}.materials", Material, "Material")
+        if len(materials) != sum(rows):
             raise refuse(
-                f"{at}.materials", len(self.materials), f"{sum(rows)} fibrils (rows) need one material each, row by row"
+                f"{at}.materials", len(materials), f"{sum(rows)} fibrils (rows) need one material each, row by row"
             )
-        store(self, rows=rows, materials=tuple(self.materials))
+        store(self, rows=rows, materials=materials)
         check(self, at)
 
     @property
@@ -137,9 +138,10 @@ def check_rows(rows: object, field: str) -> tuple[int, ...]:
     >>> check_rows([3, 4, 3], "yarns.conductive.rows")
     (3, 4, 3)
     """
-    if not isinstance(rows, list | tuple) or not rows:
+    items = sequence(rows, field, "the numbers of fibrils in each row, such as [3, 4, 3]")
+    if not items:
         raise refuse(field, rows, "it must be a list with the number of fibrils in each row, such as [3, 4, 3]")
-    checked = tuple(whole(n, f"{field}[{i}]", 1, MOST_FIBRILS) for i, n in enumerate(rows))
+    checked = tuple(whole(n, f"{field}[{i}]", 1, MOST_FIBRILS) for i, n in enumerate(items))
     if sum(checked) > MOST_FIBRILS:
         raise refuse(field, sum(checked), f"a yarn has at most {MOST_FIBRILS} fibrils")
     return checked
@@ -205,8 +207,8 @@ class Weave:
         store(
             self,
             draft=check_draft(self.draft, "weave.draft"),
-            warp=tuple(self.warp),
-            weft=tuple(self.weft),
+            warp=instances(self.warp, "weave.warp", Yarn, "Yarn"),
+            weft=instances(self.weft, "weave.weft", Yarn, "Yarn"),
         )
         check(self, "weave")
         for which, wanted in (("warp", len(self.draft)), ("weft", len(self.draft[0]))):
@@ -308,16 +310,17 @@ def check_draft(draft: object, field: str) -> tuple[tuple[int, ...], ...]:
     >>> check_draft([[1, 0], [0, 1]], "weave.draft")
     ((1, 0), (0, 1))
     """
-    rows_wanted = "it must be a list of rows of 0 and 1, one row for each warp yarn"
-    if not isinstance(draft, list | tuple) or not draft:
-        raise refuse(field, draft, rows_wanted)
-    for i, row in enumerate(draft):
-        if not isinstance(row, list | tuple) or not row:
-            raise refuse(f"{field}[{i}]", row, rows_wanted)
-        if len(row) != len(draft[0]):
-            raise refuse(f"{field}[{i}]", row, f"every row must have as many entries as the first, {len(draft[0])}")
+    wanted = "rows of 0 and 1, one row for each warp yarn"
+    rows = [sequence(row, f"{field}[{i}]", wanted) for i, row in enumerate(sequence(draft, field, wanted))]
+    if not rows:
+        raise refuse(field, draft, f"it must be a list of {wanted}")
+    for i, row in enumerate(rows):
+        if not row:
+            raise refuse(f"{field}[{i}]", row, f"it must be a list of {wanted}")
+        if len(row) != len(rows[0]):
+            raise refuse(f"{field}[{i}]", row, f"every row must have as many entries as the first, {len(rows[0])}")
     return tuple(
-        tuple(whole(cell, f"{field}[{i}][{j}]", 0, 1) for j, cell in enumerate(row)) for i, row in enumerate(draft)
+        tuple(whole(cell, f"{field}[{i}][{j}]", 0, 1) for j, cell in enumerate(row)) for i, row in enumerate(rows)
     )
 
 
@@ -432,7 +435,12 @@ class MaterialPair(ContactProperties):
     """Names of the two, in any order; the same twice for a material with itself."""
 
     def __post_init__(self) -> None:
-        self._check(f"contact.pairs.{'-'.join(map(str, self.materials))}")
+        at, wanted = "contact.pairs.materials", "the names of two materials"
+        names = tuple(name(each, at) for each in sequence(self.materials, at, wanted))
+        if len(names) != 2:
+            raise refuse(at, list(names), f"it must be {wanted}")
+        store(self, materials=names)
+        self._check(f"contact.pairs.{'-'.join(names)}")
 
 
 @frozen
@@ -448,7 +456,7 @@ class ContactLaw(ContactProperties):
 
     def __post_init__(self) -> None:
         self._check("contact")
-        store(self, pairs=tuple(self.pairs))
+        store(self, pairs=instances(self.pairs, "contact.pairs", MaterialPair, "MaterialPair"))
         seen: set[frozenset[str]] = set()
         for pair in self.pairs:
             if frozenset(pair.materials) in seen:

@@ -11,6 +11,7 @@ from typing import TypeVar
 from circuittex.design.checks import is_name, name, one_of, real, refuse, truth, whole
 from circuittex.design.declaration import keys, read
 from circuittex.design.experiment import (
+    MOST_STATES,
     MOST_STRETCH,
     Gradient,
     Loading,
@@ -30,9 +31,6 @@ from circuittex.design.statement import FORMAT, Design, Electrical, Numerics
 from circuittex.design.table import Table, choose, quantity
 from circuittex.design.touching import AUTO, touching_amplitude
 from circuittex.design.yarn_table import conductivities, read_material, read_yarn
-
-MOST_STATES = 10_000
-"""Recorded states of one loading."""
 
 _T = TypeVar("_T")
 _END = re.compile(r"([A-Za-z0-9_-]+?)([+-])", re.ASCII)

@@ -7,7 +7,7 @@ import json
 from dataclasses import field, fields, is_dataclass
 
 from circuittex.base.frozen import frozen, same
-from circuittex.design.checks import distinct, refuse, title
+from circuittex.design.checks import distinct, instance, instances, refuse, store, title
 from circuittex.design.declaration import check, choice, count, flag, number, relative
 from circuittex.design.experiment import Loading, Probe, Terminal
 from circuittex.design.fabric import ContactLaw, Weave
@@ -222,6 +222,13 @@ class Design:
 
     def __post_init__(self) -> None:
         title(self.name, "name")
+        for key, one in (
+            *(("weave", Weave), ("contact", ContactLaw), ("electrical", Electrical)),
+            *(("numerics", Numerics), ("packing", Packing)),
+        ):
+            instance(getattr(self, key), key, one)
+        for key, each in (("loading", Loading), ("terminals", Terminal), ("probes", Probe)):
+            store(self, **{key: instances(getattr(self, key), key, each, each.__name__)})
         distinct(tuple(loading.name for loading in self.loading), "loading.name")
         for place in range(len(self.loading)):
             starting_state(self.loading, place)

@@ -50,6 +50,23 @@ def section_stress(record: Record) -> Floats:
     return np.asarray(record.section_force / mesh.area[mesh.element_fibril])
 
 
+def surface_stress(record: Record) -> Floats:
+    """(M,) largest axial stress at the surface of each element, MPa: sigma = |N| / A + E R kappa.
+
+    The curvature is that of the directors along the element, kappa_a = g_a' . t with the unit tangent t of the centre
+    line [9], kappa = sqrt(kappa_1^2 + kappa_2^2), per length of the natural, straight fibril; the element's mean.
+    """
+    mesh = record.contacts.mesh
+    first, last = mesh.elements[:, 0], mesh.elements[:, -1]
+    slope = (record.configuration.x[last] - record.configuration.x[first]) / (mesh.xi[last] - mesh.xi[first])[
+        :, None, None
+    ]
+    tangent = slope[:, 0] / np.linalg.norm(slope[:, 0], axis=1)[:, None]
+    curvature = np.linalg.norm(np.einsum("mac,mc->ma", slope[:, 1:], tangent), axis=1)
+    fibril = mesh.element_fibril
+    return np.asarray(section_stress(record) + mesh.youngs_modulus[fibril] * mesh.radius[fibril] * curvature)
+
+
 def points_across(contacts: ContactState) -> float:
     """Contact points across the contacts of different yarns, where they touch over more of them than most; inf where
     none touch.
@@ -80,7 +97,7 @@ def doubts(study: Study, record: Record) -> tuple[Doubt, ...]:
     """What cannot be right in a state, or not be trusted; empty if all is well."""
     mesh = record.contacts.mesh
     overlap, limit = deepest_overlap(record.contacts)[0], study.design.numerics.overlap_warning
-    stress, fibril = section_stress(record), mesh.element_fibril
+    stress, fibril = surface_stress(record), mesh.element_fibril
     carried = strength(mesh.youngs_modulus[fibril])
     worst, rise = int(np.argmax(stress / carried)), record.peak_temperature
     found = [
@@ -93,8 +110,9 @@ def doubts(study: Study, record: Record) -> tuple[Doubt, ...]:
         Doubt(
             "stress",
             float(stress[worst] / carried[worst]),
-            f"the stress reaches {stress[worst]:.3g} MPa in {mesh.yarn_names[mesh.yarn[fibril[worst]]]}: no material "
-            f"of that modulus carries more than {carried[worst]:.3g} MPa",
+            f"the stress reaches {stress[worst]:.3g} MPa, bending included, in "
+            f"{mesh.yarn_names[mesh.yarn[fibril[worst]]]}: no material of that modulus carries more than "
+            f"{carried[worst]:.3g} MPa",
         ),
         Doubt(
             "temperature",

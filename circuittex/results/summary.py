@@ -90,7 +90,7 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results.bifurcation import BranchCheck, branch_statement, current_difference, force_difference
 from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.records import Record, Study
-from circuittex.results.soundness import deepest_overlap, doubt_statement, doubts, section_stress
+from circuittex.results.soundness import deepest_overlap, doubt_statement, doubts, surface_stress
 from circuittex.results.verification import AGREEMENT
 from circuittex.results.work import EnergyBalance, step_balances
 
@@ -331,7 +331,7 @@ def _state(study: Study, record: Record, step: EnergyBalance | None) -> dict[str
         "contact_points": record.contacts.n_contacts,
         "levels": record.levels,
         "deepest_overlap": deepest_overlap(record.contacts)[0],
-        "largest_stress_MPa": section_stress(record).max(),
+        "largest_stress_MPa": surface_stress(record).max(),
         "doubts": [doubt.text for doubt in doubts(study, record)],
         "netlist": record.netlist,
         "error_estimate": None if error is None else _error_estimate(error),

@@ -24,7 +24,7 @@ from circuittex.results.report.errors import error_section
 from circuittex.results.report.number import number as _number
 from circuittex.results.report.parameters import parameters
 from circuittex.results.report.template import render, table
-from circuittex.results.soundness import deepest_overlap, doubt_statement, section_stress
+from circuittex.results.soundness import deepest_overlap, doubt_statement, surface_stress
 from circuittex.results.summary import (
     agrees,
     confirmed,
@@ -164,7 +164,7 @@ def _equilibrium(study: Study) -> dict[str, Any]:
             f"{r.residual:.1e}",
             *map(str, (r.iterations, r.parts, r.levels, r.contacts.n_contacts)),
             f"{deepest_overlap(r.contacts)[0]:.2f}",
-            _number(float(section_stress(r).max())),
+            _number(float(surface_stress(r).max())),
             r.netlist,
         ]
         for r in study.records

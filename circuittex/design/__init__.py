@@ -1,5 +1,6 @@
 """What the user states: a frozen, validated `Design`, from TOML, from a mapping, or from Python."""
 
+from circuittex.design.contact import HERTZ, ContactLaw, MaterialPair
 from circuittex.design.experiment import (
     Gradient,
     Loading,
@@ -11,7 +12,6 @@ from circuittex.design.experiment import (
     shear,
     uniaxial,
 )
-from circuittex.design.fabric import HERTZ, ContactLaw, Material, MaterialPair, Weave, Yarn
 from circuittex.design.files import load_design, parse_design, starter
 from circuittex.design.grid import strain_grid
 from circuittex.design.packing import Packing
@@ -19,6 +19,8 @@ from circuittex.design.paper import plain_weave
 from circuittex.design.statement import Design, Electrical, Numerics, design_hash
 from circuittex.design.touching import touching_amplitude
 from circuittex.design.trade import fibril_conductivity, fibril_radius, hexagonal_rows
+from circuittex.design.weave import Weave
+from circuittex.design.yarn import Material, Yarn
 
 __all__ = [
     "HERTZ",

@@ -189,7 +189,7 @@ def starter_lines(kind: type) -> str:
 
     >>> from circuittex.design import Weave
     >>> starter_lines(Weave).splitlines()[0]
-    'pitch = "2.5 mm"                          # between neighbouring yarn axes, in both directions'
+    'pitch = "2.5 mm"                          # between the axes of neighbouring warp yarns'
     """
     lines = []
     for name, key in keys(kind).items():

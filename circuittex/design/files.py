@@ -10,11 +10,13 @@ from pathlib import Path
 
 from circuittex.base.errors import DesignError
 from circuittex.design.checks import refuse
+from circuittex.design.contact import ContactLaw
 from circuittex.design.declaration import starter_lines
-from circuittex.design.fabric import ContactLaw, Material, Weave, Yarn
 from circuittex.design.packing import Packing
 from circuittex.design.reader import read_design
 from circuittex.design.statement import Design, Electrical, Numerics
+from circuittex.design.weave import Weave
+from circuittex.design.yarn import Material, Yarn
 
 DECLARED: tuple[type, ...] = (Material, Yarn, Weave, ContactLaw, Electrical, Numerics, Packing)
 """The parts of a design whose keys are declared beside their fields, in the order of the starter design."""

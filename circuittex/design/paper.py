@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from circuittex.design.checks import one_of, whole
+from circuittex.design.contact import ContactLaw
 from circuittex.design.experiment import Loading, Probe, Terminal
-from circuittex.design.fabric import ContactLaw, Material, Weave, Yarn, check_rows
 from circuittex.design.statement import Design, Numerics
+from circuittex.design.weave import Weave
+from circuittex.design.yarn import Material, Yarn, check_rows
 
 _MODULUS = {"paper-code": 10.0, "paper-table": 1.26}  # MPa: what the paper's code used, what its Table I prints
 _MOST_YARNS = 100  # a draft of ten thousand crossings

@@ -9,6 +9,7 @@ from math import hypot, inf
 from typing import TypeVar
 
 from circuittex.design.checks import is_name, name, one_of, real, refuse, truth, whole
+from circuittex.design.contact import ContactLaw, MaterialPair
 from circuittex.design.declaration import keys, read
 from circuittex.design.experiment import (
     MOST_STATES,
@@ -24,12 +25,13 @@ from circuittex.design.experiment import (
     shear,
     uniaxial,
 )
-from circuittex.design.fabric import ContactLaw, MaterialPair, Weave, Yarn, check_draft
 from circuittex.design.grid import AXES, strain_grid
 from circuittex.design.packing import Packing
 from circuittex.design.statement import FORMAT, Design, Electrical, Numerics
 from circuittex.design.table import Table, choose, quantity
 from circuittex.design.touching import AUTO, touching_amplitude
+from circuittex.design.weave import Weave, check_draft
+from circuittex.design.yarn import Yarn
 from circuittex.design.yarn_table import conductivities, read_material, read_yarn
 
 _T = TypeVar("_T")

@@ -14,7 +14,9 @@ from __future__ import annotations
 from math import ceil, pi, sqrt
 
 from circuittex.base.frozen import frozen
-from circuittex.design.fabric import HERTZ, ContactLaw, Material, Weave, Yarn
+from circuittex.design.contact import HERTZ, ContactLaw
+from circuittex.design.weave import Weave
+from circuittex.design.yarn import Material, Yarn
 
 POINTS = 20
 """Contact points across the length of a contact: with fewer the resistance of a crossing is off by more than 1 %,

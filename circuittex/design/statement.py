@@ -8,13 +8,14 @@ from dataclasses import field, fields, is_dataclass
 
 from circuittex.base.frozen import frozen, same
 from circuittex.design.checks import distinct, instance, instances, refuse, store, title
+from circuittex.design.contact import ContactLaw
 from circuittex.design.declaration import check, choice, count, flag, number, relative
 from circuittex.design.experiment import Loading, Probe, Terminal
-from circuittex.design.fabric import ContactLaw, Weave
 from circuittex.design.grid import starting_state
 from circuittex.design.packing import Packing
 from circuittex.design.resolution import Resolution, resolution
 from circuittex.design.units import parse
+from circuittex.design.weave import Weave
 
 FORMAT = 1
 """The layout described by the starter design."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from circuittex.base.arrays import Floats
 from circuittex.design.checks import refuse
-from circuittex.design.fabric import Yarn
+from circuittex.design.yarn import Yarn
 
 AUTO = "auto"
 """Stands for the amplitude that this finds."""

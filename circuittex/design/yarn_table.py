@@ -8,9 +8,9 @@ from typing import Any
 
 from circuittex.design.checks import real, refuse, whole
 from circuittex.design.declaration import keys, read
-from circuittex.design.fabric import Material, Yarn, check_rows
 from circuittex.design.table import Table, choose
 from circuittex.design.trade import MOST_FILAMENTS, MOST_FLAT, fibril_conductivity, fibril_radius, hexagonal_rows
+from circuittex.design.yarn import Material, Yarn, check_rows
 
 CONDUCTIVITY = "electrical_conductivity"
 _TRADE = ("filaments", "flattening", "linear_density", "resistance")

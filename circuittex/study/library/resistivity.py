@@ -9,7 +9,7 @@ import numpy as np
 
 from circuittex.contact.state import ContactState
 from circuittex.design import ContactLaw, Design, Material
-from circuittex.design.fabric import ContactProperties
+from circuittex.design.contact import ContactProperties
 
 Factor = Callable[[Material | ContactProperties], float]
 """What the resistivity of a material, or 1/sigma_c of a contact, is multiplied by."""

@@ -1,0 +1,143 @@
+"""What yarns are made of: materials, and how their fibrils lie in them."""
+
+from __future__ import annotations
+
+from dataclasses import field
+
+from circuittex.base.frozen import frozen
+from circuittex.design.checks import instances, name, refuse, sequence, store, whole
+from circuittex.design.declaration import check, number
+
+MOST_FIBRILS = 10_000
+"""Fibrils of one yarn."""
+MOST_OPEN = 1e5
+"""Pitch over the smallest radius: the most open scrims of the thinnest fibrils have some 1e4."""
+STIFFEST, HEAVIEST, MOST_CONDUCTIVE, THICKEST = 1e9, 1e6, 1e9, 1e4
+"""MPa, g/mm3, S/mm and W/(mm K), mm: a thousand times and more beyond diamond, osmium, silver and a ship's rope, which
+leaves room for designs in units of another scale and none for slips of the pen."""
+STEEPEST = 0.0099
+"""1/K: with this tc1, or its square as tc2, a resistance stays positive as far as 50 K from 27 C."""
+
+
+@frozen
+class Material:
+    """What a fibril is made of: compressible Neo-Hookean [1], ohmic, heat conducting.
+
+    >>> Material("silver", 10.0, 0.0, 1.0, 10.0, 1.0).electrical_conductivity
+    10.0
+    """
+
+    name: str
+    """What it is called."""
+    youngs_modulus: float = field(
+        metadata=number(
+            "MPa",
+            "E > 0; the paper's Table I prints 1.26 MPa, its code used 10 MPa",
+            shown="10 MPa",
+            above=0,
+            at_most=STIFFEST,
+        )
+    )
+    """E, MPa."""
+    poisson_ratio: float = field(metadata=number("1", "nu, 0 to 0.45", shown="0.0", at_least=0, at_most=0.45))
+    """nu, from 0 to 0.45."""
+    density: float = field(metadata=number("g/mm3", "rho > 0", shown="1 g/mm3", above=0, at_most=HEAVIEST))
+    """rho, g/mm3."""
+    electrical_conductivity: float = field(
+        metadata=number(
+            "S/mm", "sigma >= 0; 0 makes an insulating fibril", shown="10 S/mm", at_least=0, at_most=MOST_CONDUCTIVE
+        )
+    )
+    """sigma, S/mm; 0 for an insulator."""
+    thermal_conductivity: float = field(
+        metadata=number("W/(mm K)", "k > 0", shown="1 W/(mm K)", above=0, at_most=MOST_CONDUCTIVE)
+    )
+    """k, W/(mm K)."""
+    tc1: float = field(
+        default=0.0,
+        metadata=number(
+            "1/K",
+            "of the resistivity, per kelvin from 27 C; for exported parts only",
+            shown="0.0",
+            at_least=-STEEPEST,
+            at_most=STEEPEST,
+        ),
+    )
+    """Linear temperature coefficient of the resistivity, 1/K: times
+    1 + tc1 dT + tc2 dT^2, dT from 27 C, SPICE's tnom."""
+    tc2: float = field(
+        default=0.0,
+        metadata=number(
+            "1/K2", "of the resistivity, per kelvin squared", shown="0.0", at_least=-(STEEPEST**2), at_most=STEEPEST**2
+        ),
+    )
+    """Quadratic temperature coefficient of the resistivity, 1/K2."""
+    tolerance: float = field(
+        default=0.0,
+        metadata=number(
+            "1", "relative, of the resistivity; for exported parts only", shown="0.0", at_least=0, at_most=0.9
+        ),
+    )
+    """Tolerance of the resistivity, relative: from 1 - tolerance to 1 + tolerance of what is stated."""
+
+    def __post_init__(self) -> None:
+        check(self, f"materials.{name(self.name, 'materials')}")
+
+
+@frozen
+class Yarn:
+    """A kind of yarn: parallel fibrils packed in rows, the bottom row first.
+
+    Fibrils are numbered row by row, within a row towards growing y (warp) or x (weft).
+
+    >>> silver = Material("silver", 10.0, 0.0, 1.0, 10.0, 1.0)
+    >>> Yarn("conductive", (3, 4, 3), 0.15, 0.3, 0.3, (silver,) * 10).n_fibrils
+    10
+    """
+
+    name: str
+    """What it is called."""
+    rows: tuple[int, ...]
+    """Fibrils in each row."""
+    radius: float = field(metadata=number("mm", "of every fibril", shown="0.15 mm", above=0, at_most=THICKEST))
+    """R of every fibril, mm."""
+    spacing: float = field(metadata=number("mm", "between the axes of neighbours in a row", shown="0.3 mm", above=0))
+    """Distance of neighbours within a row, mm."""
+    row_spacing: float = field(
+        metadata=number(
+            "mm", "optional, between neighbouring rows, vertically; default: spacing", shown="0.3 mm", above=0
+        )
+    )
+    """Vertical distance of neighbouring rows, mm."""
+    materials: tuple[Material, ...]
+    """One for each fibril."""
+
+    def __post_init__(self) -> None:
+        at = f"yarns.{name(self.name, 'yarns')}"
+        rows = check_rows(self.rows, f"{at}.rows")
+        materials = instances(self.materials, f"{at}.materials", Material, "Material")
+        if len(materials) != sum(rows):
+            raise refuse(
+                f"{at}.materials", len(materials), f"{sum(rows)} fibrils (rows) need one material each, row by row"
+            )
+        store(self, rows=rows, materials=materials)
+        check(self, at)
+
+    @property
+    def n_fibrils(self) -> int:
+        return sum(self.rows)
+
+
+def check_rows(rows: object, field: str) -> tuple[int, ...]:
+    """The numbers of fibrils in each row, checked before anything of that size is made.
+
+    >>> check_rows([3, 4, 3], "yarns.conductive.rows")
+    (3, 4, 3)
+    """
+    items = sequence(rows, field, "the numbers of fibrils in each row, such as [3, 4, 3]")
+    if not items:
+        raise refuse(field, rows, "it must be a list with the number of fibrils in each row, such as [3, 4, 3]")
+    checked = tuple(whole(n, f"{field}[{i}]", 1, MOST_FIBRILS) for i, n in enumerate(items))
+    if sum(checked) > MOST_FIBRILS:
+        raise refuse(field, sum(checked), f"a yarn has at most {MOST_FIBRILS} fibrils")
+    return checked

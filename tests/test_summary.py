@@ -163,3 +163,12 @@ def test_a_difference_that_ngspices_rounding_explains_is_none(tmp_path: Path) ->
 def test_a_reduced_network_that_ngspice_did_not_check_is_named() -> None:
     study = disagreeing(STUDY, "relaxed", reduced_difference=math.nan)
     assert table(study).splitlines()[-1] == "ngspice did NOT check the reduced network of relaxed."
+
+
+def test_a_badly_conditioned_reduced_network_is_no_disagreement() -> None:
+    """The routes agree and ngspice did look: neither "DISAGREE" nor "did NOT check" would be true."""
+    study = disagreeing(STUDY, "relaxed", reduced_difference=3e-5)
+    sentence = table(study).splitlines()[-1]
+    assert sentence.startswith("ngspice finds currents of the reduced network of relaxed that differ by up to 3.0e-05")
+    assert "DISAGREE" not in table(study)
+    assert "did NOT check" not in table(study)

@@ -231,8 +231,14 @@ def ngspice_statement(study: Study) -> tuple[str, ...]:
         )
     sound = [record for record in study.records if record.verification.ngspice_checked and agrees(record)]
     reduced = [record for record in sound if not confirmed(record)]
-    if reduced:
-        sentences.append(f"ngspice did NOT check the reduced network of {_which(study, reduced)}.")
+    if silent := [record for record in reduced if math.isnan(record.reduced_difference)]:
+        sentences.append(f"ngspice did NOT check the reduced network of {_which(study, silent)}.")
+    if off := [record for record in reduced if not math.isnan(record.reduced_difference)]:
+        worst = max(record.reduced_difference for record in off)
+        sentences.append(
+            f"ngspice finds currents of the reduced network of {_which(study, off)} that differ by up to {worst:.1e} from "
+            "those of the fit: rounding does that where its resistances lie many powers of ten apart."
+        )
     if not sentences:
         sentences.append("ngspice confirmed every recorded state.")
     limit = max((record.verification.ngspice_limit for record in study.records), default=0.0)

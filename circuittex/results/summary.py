@@ -236,8 +236,8 @@ def ngspice_statement(study: Study) -> tuple[str, ...]:
     if off := [record for record in reduced if not math.isnan(record.reduced_difference)]:
         worst = max(record.reduced_difference for record in off)
         sentences.append(
-            f"ngspice finds currents of the reduced network of {_which(study, off)} that differ by up to {worst:.1e} from "
-            "those of the fit: rounding does that where its resistances lie many powers of ten apart."
+            f"ngspice finds currents of the reduced network of {_which(study, off)} that differ by up to {worst:.1e} "
+            "from those of the fit: rounding does that where its resistances lie many powers of ten apart."
         )
     if not sentences:
         sentences.append("ngspice confirmed every recorded state.")

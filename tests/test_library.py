@@ -241,6 +241,19 @@ def test_corners_of_packings_that_differ_in_one_factor(corners: Path, end: str, 
     np.testing.assert_allclose(found, strained, rtol=SAMPLED)
 
 
+@pytest.mark.parametrize(("end", "factor"), [("p05", 1.18), ("p50", 1.0), ("p95", 0.82)])
+def test_corners_of_the_cell_go_with_that_factor_too(corners: Path, end: str, factor: float) -> None:
+    """A network whose resistances are all f times larger is fitted by Ry and Rc f times larger."""
+    plain = answers(ohmmeter(corners, "fabric_cell", PAIRS))
+    np.testing.assert_allclose(answers(ohmmeter(corners, f"fabric_cell_{end}", PAIRS)), plain / factor, rtol=SAMPLED)
+    plain = answers(ohmmeter(corners, "fabric_cell_stretch_s", PAIRS, "strain=0.05"))
+    found = answers(ohmmeter(corners, f"fabric_cell_{end}_stretch_s", PAIRS, "strain=0.05"))
+    np.testing.assert_allclose(found, plain / factor, rtol=SAMPLED)
+    place = {"p05": "-1.6448536269514722", "p50": "0", "p95": "1.6448536269514722"}[end]
+    found = answers(ohmmeter(corners, "fabric_cell_mc_stretch_s", PAIRS, f"strain=0.05 mc={place}"))
+    np.testing.assert_allclose(found, plain / factor, rtol=SAMPLED)
+
+
 @pytest.mark.parametrize(
     ("mc", "factor"),
     [

@@ -234,9 +234,9 @@ def ngspice_statement(study: Study) -> tuple[str, ...]:
     if silent := [record for record in reduced if math.isnan(record.reduced_difference)]:
         sentences.append(f"ngspice did NOT check the reduced network of {_which(study, silent)}.")
     if off := [record for record in reduced if not math.isnan(record.reduced_difference)]:
-        worst = max(record.reduced_difference for record in off)
+        largest = max(record.reduced_difference for record in off)
         sentences.append(
-            f"ngspice finds currents of the reduced network of {_which(study, off)} that differ by up to {worst:.1e} "
+            f"ngspice finds currents of the reduced network of {_which(study, off)} that differ by up to {largest:.1e} "
             "from those of the fit: rounding does that where its resistances lie many powers of ten apart."
         )
     if not sentences:

@@ -139,7 +139,7 @@ def _with_temperature(
     made: list[list[Part]] = []
     for kelvin in (-STEP, STEP):
         found = levels(study, ends, warmer(kelvin))
-        there = replace(known, levels=found, reductions=(exact(found.ports),))
+        there = replace(known, levels=found, reductions=(exact(found.ports),), fit_corners=())
         made.append(list(_parts(study, there, word, chosen, ends, warmer(kelvin))))
     ports = {kelvin: port_matrices(study, ends, known.levels.pins, warmer(kelvin)) for kelvin in CHECKED}
     states = {path.word: path.records for path in known.paths} | {"": np.array([chosen])}
@@ -150,9 +150,9 @@ def _with_temperature(
 def _parts(study: Study, known: Facts, word: str, chosen: int, ends: str, factor: Factor = as_stated) -> Iterator[Part]:
     design = study.design
     circuit = detailed(design, study.records[chosen], ends, factor)
-    yield from fixed_parts(word, design, known.levels, known.reductions, chosen, circuit)
+    yield from fixed_parts(word, design, known.levels, known.reductions, chosen, circuit, known.fit_corners)
     for path in known.paths:
-        yield from strained_parts(word, design, known.levels, known.reductions, path)
+        yield from strained_parts(word, design, known.levels, known.reductions, path, known.fit_corners)
     for grid in known.grids:
         yield from grid_parts(word, design, known.levels, known.reductions, grid)
 

@@ -12,6 +12,7 @@ from circuittex.electrical.network.ports import port_matrix
 from circuittex.results.records import Study
 from circuittex.study.library.accuracy import Errors, compared
 from circuittex.study.library.bicubic import left_out
+from circuittex.study.library.fit_corners import FitCorner, fit_corners
 from circuittex.study.library.interpolation import without
 from circuittex.study.library.levels import CRIMPED, Levels, levels, port_matrices
 from circuittex.study.library.network import matrix_at, ports_network
@@ -36,6 +37,8 @@ class Facts:
     """What stands between the pins in every state."""
     reductions: tuple[Reduction, ...]
     """Of the ports: the exact one, a thinned one where asked for, and the corners of an ensemble."""
+    fit_corners: tuple[FitCorner, ...]
+    """Of the networks of Ry and Rc, of an ensemble."""
     paths: tuple[StrainPath, ...]
     """The ways along which strain is an input."""
     grids: tuple[StrainGrid, ...]
@@ -109,14 +112,21 @@ def facts_of(
     if error:
         reductions.append(thin(known.ports, error))
         errors["ports_thin"] = compared(known.ports, reductions[-1].ports)
-    if packings := [port_matrices(member, ends, known.pins) for member in members]:
+    packings, fits = [], []
+    for member in members:  # one at a time: they are large
+        packings.append(port_matrices(member, ends, known.pins))
+        fits.append(levels(member, ends))
+    if packings:
         reductions += corners(packings)
     if differs(study.design, "tolerance"):
         reductions += tolerances(*(port_matrices(study, ends, known.pins, at_end(sign)) for sign in (-1.0, 1.0)))
     ways = paths(study)
     left = {way.word: _left_out(known, way) for way in ways if len(way.strain) > 2}
     left |= {grid.word: _left_out_of_grid(known, grid) for grid in meshes if grid.records.size > 4}
-    return Facts(known, tuple(reductions), ways, meshes, errors, left, rise, rated_currents(study, rise), ends)
+    at_corners = fit_corners(known, fits)
+    return Facts(
+        known, tuple(reductions), at_corners, ways, meshes, errors, left, rise, rated_currents(study, rise), ends
+    )
 
 
 def _left_out(known: Levels, way: StrainPath) -> Errors:

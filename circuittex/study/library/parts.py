@@ -13,6 +13,7 @@ from circuittex.base.frozen import frozen
 from circuittex.design import Design
 from circuittex.electrical.network.circuit import Circuit, yarn_end_name
 from circuittex.study.library.cell import Pin
+from circuittex.study.library.fit_corners import FitCorner
 from circuittex.study.library.levels import Levels
 from circuittex.study.library.network import FLAG, SPREAD, STRAIN, Network, circuit_network, pin_words, ports_network
 from circuittex.study.library.reduction import CORNERS, Reduction
@@ -56,7 +57,13 @@ class Part:
 
 
 def fixed_parts(
-    name: str, design: Design, known: Levels, reductions: Sequence[Reduction], state: int, circuit: Circuit
+    name: str,
+    design: Design,
+    known: Levels,
+    reductions: Sequence[Reduction],
+    state: int,
+    circuit: Circuit,
+    fits: Sequence[FitCorner] = (),
 ) -> Iterator[Part]:
     """Every level in one state; `circuit` is its detailed one."""
     nothing = np.zeros(1)
@@ -67,6 +74,13 @@ def fixed_parts(
         network = circuit_network([known.cells[state]], nothing, known.pins)
         yield _fixed(name, design, "cell", "", TITLES["cell"], network)
         yield _fixed(name, design, "unit", "", TITLES["unit"], unit_network(known.units[[state]], nothing))
+    for fit in fits:
+        network = circuit_network([fit.levels.cells[state]], nothing, known.pins)
+        yield _fixed(name, design, "cell", fit.end, _title(fit), network)
+
+
+def _title(fit: FitCorner) -> str:
+    return f"Ry and Rc, each at percentile {fit.end[2:]} of {fit.packings} packings"
 
 
 def _fixed(name: str, design: Design, level: str, end: str, title: str, network: Network) -> Part:
@@ -74,14 +88,19 @@ def _fixed(name: str, design: Design, level: str, end: str, title: str, network:
 
 
 def strained_parts(
-    name: str, design: Design, known: Levels, reductions: Sequence[Reduction], path: StrainPath
+    name: str,
+    design: Design,
+    known: Levels,
+    reductions: Sequence[Reduction],
+    path: StrainPath,
+    fits: Sequence[FitCorner] = (),
 ) -> Iterator[Part]:
-    """Ports, cell and unit with strain as a parameter and as a pin, and the ports with a place among the corners."""
+    """Ports, cell and unit with strain as a parameter and as a pin; ports and cell with a place among the corners."""
     networks = {each.end: ports_network([each.ports[k] for k in path.records], path.strain) for each in reductions}
     for each in reductions:
         yield from strained(name, design, "ports", each.end, each.title, networks[each.end], path.word)
     if set(CORNERS) <= set(networks):
-        yield from _monte_carlo(name, design, [networks[end] for end in CORNERS], path)
+        yield from _monte_carlo(name, design, "ports", [networks[end] for end in CORNERS], path)
     if known.reason:
         return
     try:
@@ -95,20 +114,26 @@ def strained_parts(
         return
     for level, network in found.items():
         yield from strained(name, design, level, "", TITLES[level], network, path.word)
+    at = [circuit_network([fit.levels.cells[k] for k in path.records], path.strain, known.pins) for fit in fits]
+    for fit, network in zip(fits, at, strict=True):
+        yield from strained(name, design, "cell", fit.end, _title(fit), network, path.word)
+    if fits:
+        yield from _monte_carlo(name, design, "cell", at, path)
 
 
-def _monte_carlo(name: str, design: Design, corners: Sequence[Network], path: StrainPath) -> Iterator[Part]:
-    """The ports with a place among the corners as a parameter beside the strain."""
+def _monte_carlo(name: str, design: Design, level: str, corners: Sequence[Network], path: StrainPath) -> Iterator[Part]:
+    """The ports or the cell with a place among the corners as a parameter beside the strain."""
     low, middle, high = corners
     if not low.names == middle.names == high.names:
         text = f"no part with the parameter {SPREAD} for {path.loading!r}: some packings lack resistors of others"
         warnings.warn(text, CircuittexWarning, stacklevel=3)
         return
-    title = f"reduction to the pins, parameters: strain, and {SPREAD} in standard deviations of all resistors at once"
+    what = "reduction to the pins" if level == "ports" else "Ry and Rc"
+    title = f"{what}, parameters: strain, and {SPREAD} in standard deviations of all resistors at once"
     given = ((STRAIN, "0"), (SPREAD, "0"))
-    full = f"{name}_ports_{SPREAD}_{path.word}{PARAMETER}"
+    full = f"{name}_{level}_{SPREAD}_{path.word}{PARAMETER}"
     yield Part(
-        full, "ports", f"_{SPREAD}", title, middle, (*pins(design, middle), FLAGGED), given, path.word, (low, high)
+        full, level, f"_{SPREAD}", title, middle, (*pins(design, middle), FLAGGED), given, path.word, (low, high)
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import field
 from math import pi
-from typing import NamedTuple
 
 from circuittex.base.frozen import frozen, same
 from circuittex.design.checks import instances, refuse, sequence, store, whole
@@ -16,7 +15,8 @@ SAME = "same"
 """Stands for a length of the weft that is that of the warp."""
 
 
-class Direction(NamedTuple):
+@frozen
+class Direction:
     """The yarns of a weave that run in one direction."""
 
     name: str

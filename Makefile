@@ -42,7 +42,7 @@ types: $(VENV)/.ready
 	$(PY) -m mypy
 
 docs: $(VENV)/.ready-docs ngspice ## build the documentation into docs/_build, warnings are errors
-	$(PY) -m sphinx -W --keep-going -E -q -b html docs docs/_build
+	$(PY) -m sphinx -W --keep-going -E -q $(SPHINXOPTS) -b html docs docs/_build
 	@echo "documentation: docs/_build/index.html"
 
 ngspice: ## install ngspice where it is missing

@@ -75,8 +75,8 @@ def write_datasheet(
 
 def _missing(study: Study, known: Facts) -> dict[str, str]:
     corners = {} if any(each.end in CORNERS for each in known.reductions) else NO_CORNERS
-    corners |= {} if known.grids else NO_GRID
-    return corners | ({} if differs(study.design, "tc1", "tc2") else NO_TEMPERATURE) | MISSING
+    grids = {} if known.grids else NO_GRID
+    return corners | grids | ({} if differs(study.design, "tc1", "tc2") else NO_TEMPERATURE) | MISSING
 
 
 def _warmth(parts: Sequence[Part]) -> dict[str, Any]:

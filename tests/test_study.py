@@ -26,6 +26,7 @@ from circuittex.design import Design, equal_steps, shear, uniaxial
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.results.store import load_study
 from circuittex.results.store.archive import Digests
+from circuittex.results.store.journal import snapshot
 from circuittex.study.run import run_study
 
 STUDY = canned_study(2)
@@ -122,7 +123,8 @@ def states(folder: Path) -> int:
     """How many states are there: a look that costs the computing processes little."""
     if not (folder / "results.h5").exists():
         return 0
-    with h5py.File(folder / "results.h5", "r", locking=False) as file:
+    # As the run changes pages meanwhile, h5py alone could meet half a change.
+    with h5py.File(snapshot(folder / "results.h5"), "r") as file:
         return len(file["states"])
 
 

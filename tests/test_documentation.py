@@ -171,7 +171,7 @@ def test_script(command: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 @pytest.mark.parametrize("command", [line for line in COMMANDS if line.startswith("make ")])
-@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+@pytest.mark.skipif(shutil.which("make") is None, reason="the commands are make's; pytest alone runs without it")
 def test_make_knows_the_target(command: str) -> None:
     words = [*shlex.split(command), "--dry-run"]
     planned = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=SECONDS)

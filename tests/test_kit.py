@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import re
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -14,6 +13,7 @@ from pathlib import Path
 import networkx as nx
 import numpy as np
 import pytest
+from gnucap import needs_gnucap
 from scipy.io import mmread
 from scipy.sparse.linalg import spsolve
 from synthetic_study import synthetic_study
@@ -102,7 +102,7 @@ def test_networkx_reads_the_graph_whose_nodes_obey_kirchhoff(kit: Path, circuit:
             assert abs(out + values[f"i(v{node})"]) <= rounding + 1e-12 * abs(out)
 
 
-@pytest.mark.skipif(not shutil.which("gnucap"), reason="gnucap is not installed; `.ci/setup gnucap` does it")
+@needs_gnucap
 @pytest.mark.parametrize(("circuit", "count"), [("small", 18), ("medium", 40), ("cell", 40)])
 def test_gnucap_agrees(kit: Path, circuit: str, count: int, tmp_path: Path) -> None:
     """As the kit's README says; inner resistances of its sources, and what rounding makes of them, leave six digits."""

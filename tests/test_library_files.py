@@ -5,12 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from gnucap import GNUCAP, needs_gnucap
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from library_cases import CARD, pins_of, study, with_both
@@ -34,7 +34,6 @@ FUNCTIONS = {
 }
 """Of the manuals: ngspice on `.param` and B sources, LTspice's help on B sources, Xyce's reference on expressions.
 gnucap runs all of its own."""
-GNUCAP = shutil.which("gnucap")
 SUFFIXES = {"m": "e-3", "u": "e-6", "n": "e-9", "p": "e-12"}
 """Of gnucap's numbers."""
 
@@ -238,7 +237,7 @@ def test_ngspice_that_follows_ltspice_runs_the_examples_of_others(
         np.testing.assert_allclose(found.current("v1"), wanted.current("v1"), rtol=1e-9)
 
 
-@pytest.mark.skipif(GNUCAP is None, reason="gnucap is not installed; `.ci/setup gnucap` does it")
+@needs_gnucap
 def test_gnucap_reads_every_file_and_answers_as_ngspice(library: Path) -> None:
     """gnucap prints five digits, and its sources have a small resistance of their own."""
     decks = examples(library, "gnucap")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 from collections.abc import Iterable
 from dataclasses import replace
@@ -12,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gnucap import GNUCAP, needs_gnucap
 from hypothesis import given
 from hypothesis import strategies as st
 from library_cases import grid_study, pins_of, study, with_both
@@ -38,7 +38,6 @@ BETWEEN = 1e-9
 """Relative: the same polynomials by ngspice."""
 PAIRS = [("warp1_minus", "warp1_plus"), ("warp1_minus", "weft2_plus"), ("warp4_plus", "warp2_minus")]
 NAME = "fabric_ports_stretch_x_shear"
-GNUCAP = shutil.which("gnucap")
 GNUCAP_SUFFIX = {"K": 1e3, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
 GNUCAP_SOURCE = 1e-4
 """V: gnucap's sources have a small resistance of their own."""
@@ -135,7 +134,7 @@ def _number(word: str) -> float:
     return float(word[:-1]) * GNUCAP_SUFFIX[word[-1]] if word[-1] in GNUCAP_SUFFIX else float(word)
 
 
-@pytest.mark.skipif(GNUCAP is None, reason="gnucap is not installed; `.ci/setup gnucap` does it")
+@needs_gnucap
 def test_gnucap_answers_as_each_state_and_beyond(library: Path, tmp_path: Path) -> None:
     """Strain as a parameter, one and two; gnucap prints twelve digits where it is told to."""
     cases = [(f"{NAME}_s", f"stretch_x={x} shear={shear}", (x, shear)) for x in X for shear in SHEAR]

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from gnucap import needs_gnucap
 from library_cases import listed, ohmmeter, pins_of, resistor_matrix, study
 
 from circuittex.base.arrays import Floats
 from circuittex.design import Design
 from circuittex.electrical.network.circuit import build_circuit, yarn_end_terminals
 from circuittex.electrical.network.ports import PortMatrix, port_matrix, resistances
-from circuittex.electrical.spice.ngspice import find_ngspice, run_deck
+from circuittex.electrical.spice.ngspice import run_deck
 from circuittex.results.records import Study
 from circuittex.study.export import simplified
 from circuittex.study.library.export import export_library
@@ -82,7 +82,6 @@ def measured(folder: Path, name: str, dT: float, given: str = "") -> Floats:
     return np.array([float(run_deck(deck).plots[-1].voltage(["in"])[-1, 0]) for deck in decks])
 
 
-@pytest.mark.skipif(find_ngspice() is None, reason="needs ngspice")
 @pytest.mark.parametrize("dT", [-50.0, 25.0, 50.0])
 def test_ngspice_at_a_temperature_answers_as_the_circuit_of_its_conductivities(
     warm: tuple[Path, Study], dT: float
@@ -102,7 +101,6 @@ def test_ngspice_at_a_temperature_answers_as_the_circuit_of_its_conductivities(
     np.testing.assert_allclose(measured(folder, "fabric_ports", dT), wanted, rtol=bound)
 
 
-@pytest.mark.skipif(find_ngspice() is None, reason="needs ngspice")
 @pytest.mark.parametrize("name", ["fabric_ports_stretch", "fabric_cell_stretch", "fabric_unit_stretch"])
 def test_strain_as_parameter_and_as_pin_have_the_same_temperature(warm: tuple[Path, Study], name: str) -> None:
     folder, _ = warm
@@ -119,7 +117,7 @@ def test_strain_as_parameter_and_as_pin_have_the_same_temperature(warm: tuple[Pa
     assert abs(by_dT[50.0] / by_dT[0.0] - 1.0) > 0.01
 
 
-@pytest.mark.skipif(shutil.which("gnucap") is None, reason="needs gnucap")
+@needs_gnucap
 def test_gnucap_follows_the_temperature(warm: tuple[Path, Study]) -> None:
     folder, made = warm
     (deck,) = ohmmeter(folder / "gnucap", "fabric_ports", PAIRS[:1])

@@ -45,7 +45,7 @@ def locked(folder: str | Path) -> Iterator[None]:
             f"{folder}: circuittex is writing there already ({_holder(holder)}); wait until it is done, or take "
             "another folder"
         ) from None
-    except (OSError, NotImplementedError) as error:
+    except (OSError, NotImplementedError) as error:  # the latter is filelock's word for ENOSYS: no locks there, too
         if isinstance(error, OSError) and error.errno not in UNSUPPORTED:
             raise
         _note(folder, getattr(error, "strerror", None) or "not supported")

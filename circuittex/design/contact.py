@@ -8,7 +8,7 @@ from circuittex.base.frozen import frozen
 from circuittex.design.checks import instances, name, refuse, sequence, store
 from circuittex.design.contact_laws import PAPER, POWER, known
 from circuittex.design.declaration import check, number, word
-from circuittex.design.yarn import STEEPEST
+from circuittex.design.yarn import coefficient, tolerated
 
 HERTZ = "hertz"
 """The penalty P* = E*/2 of each pair of materials, with which a crossing of two cylinders is Hertz's contact."""
@@ -39,38 +39,20 @@ class ContactProperties:
     tc1: float = field(
         default=0.0,
         kw_only=True,
-        metadata=number(
-            "1/K",
-            "of the resistance of contacts, per kelvin from 27 C; for exported parts only",
-            shown="0.0",
-            at_least=-STEEPEST,
-            at_most=STEEPEST,
-        ),
+        metadata=coefficient(1, "of the resistance of contacts, per kelvin from 27 C; for exported parts only"),
     )
     """Linear temperature coefficient of the resistance 1/sigma_c, 1/K: times
     1 + tc1 dT + tc2 dT^2, dT from 27 C, SPICE's tnom."""
     tc2: float = field(
         default=0.0,
         kw_only=True,
-        metadata=number(
-            "1/K2",
-            "of the resistance of contacts, per kelvin squared",
-            shown="0.0",
-            at_least=-(STEEPEST**2),
-            at_most=STEEPEST**2,
-        ),
+        metadata=coefficient(2, "of the resistance of contacts, per kelvin squared"),
     )
     """Quadratic temperature coefficient of the resistance 1/sigma_c, 1/K2."""
     tolerance: float = field(
         default=0.0,
         kw_only=True,
-        metadata=number(
-            "1",
-            "relative, of the resistance of contacts; for exported parts only",
-            shown="0.0",
-            at_least=0,
-            at_most=0.9,
-        ),
+        metadata=tolerated("relative, of the resistance of contacts; for exported parts only"),
     )
     """Tolerance of the resistance 1/sigma_c, relative: from 1 - tolerance to 1 + tolerance of what is stated."""
     law: str = field(

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import field
 
 from circuittex.base.frozen import frozen
 from circuittex.design.checks import instances, name, refuse, sequence, store, whole
-from circuittex.design.declaration import check, number
+from circuittex.design.declaration import Key, check, number
 
 MOST_FIBRILS = 10_000
 """Fibrils of one yarn."""
@@ -17,6 +18,25 @@ STIFFEST, HEAVIEST, MOST_CONDUCTIVE, THICKEST = 1e9, 1e6, 1e9, 1e4
 leaves room for designs in units of another scale and none for slips of the pen."""
 STEEPEST = 0.0099
 """1/K: with this tc1, or its square as tc2, a resistance stays positive as far as 50 K from 27 C."""
+
+
+def coefficient(power: int, note: str) -> Mapping[str, Key]:
+    """Metadata of a temperature coefficient in 1/K to that power.
+
+    >>> coefficient(2, "of the resistivity")["key"].allowed
+    '>= -9.801e-05 and <= 9.801e-05 1/K2'
+    """
+    most = STEEPEST**power
+    return number("1/K" if power == 1 else f"1/K{power}", note, shown="0.0", at_least=-most, at_most=most)
+
+
+def tolerated(note: str) -> Mapping[str, Key]:
+    """Metadata of a tolerance, in parts of what is stated.
+
+    >>> tolerated("relative")["key"].check(0.05, "tolerance")
+    0.05
+    """
+    return number("1", note, shown="0.0", at_least=0, at_most=0.9)
 
 
 @frozen
@@ -55,28 +75,18 @@ class Material:
     """k, W/(mm K)."""
     tc1: float = field(
         default=0.0,
-        metadata=number(
-            "1/K",
-            "of the resistivity, per kelvin from 27 C; for exported parts only",
-            shown="0.0",
-            at_least=-STEEPEST,
-            at_most=STEEPEST,
-        ),
+        metadata=coefficient(1, "of the resistivity, per kelvin from 27 C; for exported parts only"),
     )
     """Linear temperature coefficient of the resistivity, 1/K: times
     1 + tc1 dT + tc2 dT^2, dT from 27 C, SPICE's tnom."""
     tc2: float = field(
         default=0.0,
-        metadata=number(
-            "1/K2", "of the resistivity, per kelvin squared", shown="0.0", at_least=-(STEEPEST**2), at_most=STEEPEST**2
-        ),
+        metadata=coefficient(2, "of the resistivity, per kelvin squared"),
     )
     """Quadratic temperature coefficient of the resistivity, 1/K2."""
     tolerance: float = field(
         default=0.0,
-        metadata=number(
-            "1", "relative, of the resistivity; for exported parts only", shown="0.0", at_least=0, at_most=0.9
-        ),
+        metadata=tolerated("relative, of the resistivity; for exported parts only"),
     )
     """Tolerance of the resistivity, relative: from 1 - tolerance to 1 + tolerance of what is stated."""
 

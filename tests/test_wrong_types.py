@@ -34,11 +34,13 @@ RIGHT: list[tuple[Callable[..., Any], dict[str, Any]]] = [
     (ct.uniaxial, {"name": "pull", "strains": (0.1,), "axis": "x", "free": ""}),
     (ct.biaxial, {"name": "pull", "strains": (0.1,)}),
     (ct.shear, {"name": "pull", "strains": (0.1,), "free": ""}),
+    (ct.strain_grid, {"name": "pull", "first": "x", "first_strains": (0.1,), "then": "y", "then_strains": (0.1,)}),
     (ct.equal_steps, {"strain": 0.1, "steps": 2}),
     (ct.load_unload, {"loading": LOADING}),
     (ct.Design, {key: getattr(DESIGN, key) for key in ("name", "weave", "contact", "loading", "terminals", "probes")}
      | {"electrical": ct.Electrical(), "numerics": ct.Numerics(), "packing": ct.Packing()}),
 ]  # fmt: skip
+GRID = next(i for i, (make, _) in enumerate(RIGHT) if make is ct.strain_grid)
 NEVER = (None, True, float("nan"), float("inf"), object(), {1: 2}, b"left", 1j, np.array(None))
 """Right nowhere: no field of these constructors is a truth value."""
 ARGUMENTS = [pytest.param(make, right, key, id=f"{make.__name__}-{key}") for make, right in RIGHT for key in right]
@@ -88,6 +90,12 @@ def test_arrays_are_taken_where_sequences_are() -> None:
     assert same(replace(WEAVE, warp=list(WEAVE.warp)), WEAVE)
     assert same(ct.Terminal("left", [["warp1", np.int64(-1)]]), ct.Terminal("left", (("warp1", -1),)))
     assert same(replace(PAIR, materials=np.array(PAIR.materials)), PAIR)
+
+
+def test_a_loadings_name_is_looked_at_before_a_message_has_it() -> None:
+    name = [np.eye(2)]
+    assert "loading.name" in refused(ct.uniaxial, {"name": name, "strains": None})
+    assert "loading.name" in refused(ct.strain_grid, RIGHT[GRID][1] | {"name": name, "first_strains": None})
 
 
 def test_materials_of_a_pair_are_two_names() -> None:

@@ -43,7 +43,7 @@ class Loading:
     """Gradient of the state that it starts from: the relaxed one, or one of a loading before it (`starting_state`)."""
 
     def __post_init__(self) -> None:
-        at = f"loading.{name(self.name, 'loading.name')}"
+        at = loading_field(self.name)
         gradients = sequence(self.gradients, f"{at}.gradients", "matrices [[Fxx, Fxy], [Fyx, Fyy]]")
         strains = check_strains(self.strains, f"{at}.strains")
         if not gradients:
@@ -65,8 +65,9 @@ def uniaxial(name: str, strains: Sequence[float], axis: str = "x", free: str = "
     >>> uniaxial("stretch", equal_steps(0.1, 4)).gradients[3]
     ((1.1, 0.0), (0.0, 1.0))
     """
-    strains = check_strains(strains, f"loading.{name}.strains")
-    along_x = one_of(axis, f"loading.{name}.axis", ("x", "y")) == "x"
+    at = loading_field(name)
+    strains = check_strains(strains, f"{at}.strains")
+    along_x = one_of(axis, f"{at}.axis", ("x", "y")) == "x"
     gradients = tuple(((1.0 + e, 0.0), (0.0, 1.0)) if along_x else ((1.0, 0.0), (0.0, 1.0 + e)) for e in strains)
     return Loading(name, gradients, strains, free)
 
@@ -77,7 +78,7 @@ def biaxial(name: str, strains: Sequence[float]) -> Loading:
     >>> biaxial("swell", [0.5]).gradients
     (((1.5, 0.0), (0.0, 1.5)),)
     """
-    strains = check_strains(strains, f"loading.{name}.strains")
+    strains = check_strains(strains, f"{loading_field(name)}.strains")
     return Loading(name, tuple(((1.0 + e, 0.0), (0.0, 1.0 + e)) for e in strains), strains)
 
 
@@ -87,7 +88,7 @@ def shear(name: str, strains: Sequence[float], free: str = "") -> Loading:
     >>> shear("shear", [0.25]).gradients
     (((1.0, 0.0), (0.25, 1.0)),)
     """
-    strains = check_strains(strains, f"loading.{name}.strains")
+    strains = check_strains(strains, f"{loading_field(name)}.strains")
     return Loading(name, tuple(((1.0, 0.0), (g, 1.0)) for g in strains), strains, free)
 
 
@@ -111,6 +112,15 @@ def equal_steps(strain: float, steps: int) -> tuple[float, ...]:
     exact = Fraction(repr(real(strain, "strain")))
     steps = whole(steps, "steps", 1, MOST_STATES)
     return tuple(float(exact * i / steps) for i in range(1, steps + 1))
+
+
+def loading_field(of: object) -> str:
+    """The field of the loading called `of`, whose name must be one before it stands in any message.
+
+    >>> loading_field("stretch")
+    'loading.stretch'
+    """
+    return f"loading.{name(of, 'loading.name')}"
 
 
 def check_strains(strains: object, field: str) -> tuple[float, ...]:

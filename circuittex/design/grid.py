@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from circuittex.design.checks import one_of, refuse
-from circuittex.design.experiment import REST, Gradient, Loading
+from circuittex.design.experiment import REST, Gradient, Loading, check_strains, loading_field
 
 AXES = ("x", "y", "shear")
 """Stretch along x, stretch along y, and simple shear: Fxx - 1, Fyy - 1 and Fyx."""
@@ -23,17 +23,18 @@ def strain_grid(
     >>> [(each.name, each.strains) for each in strain_grid("pull", "x", (0.05,), "y", (0.1, 0.2))]
     [('pull-x', (0.05,)), ('pull-x0-y', (0.1, 0.2)), ('pull-x0p05-y', (0.1, 0.2))]
     """
-    one_of(first, f"loading.{name}.first.axis", AXES)
+    at = loading_field(name)
+    one_of(first, f"{at}.first.axis", AXES)
     rest = tuple(axis for axis in AXES if axis != first)
-    one_of(then, f"loading.{name}.then.axis", rest)
-    _check_outwards(first_strains, f"loading.{name}.first.strains")
-    _check_outwards(then_strains, f"loading.{name}.then.strains")
+    one_of(then, f"{at}.then.axis", rest)
+    first_strains = _outwards(first_strains, f"{at}.first.strains")
+    then_strains = _outwards(then_strains, f"{at}.then.strains")
     along = tuple(_gradient({first: e}) for e in first_strains)
-    rows = [Loading(f"{name}-{first}", along, tuple(first_strains))]
+    rows = [Loading(f"{name}-{first}", along, first_strains)]
     for held, start in zip((0.0, *first_strains), (REST, *along), strict=True):
         gradients = tuple(_gradient({first: held, then: e}) for e in then_strains)
         word = f"{held:.6g}".replace(".", "p")
-        rows.append(Loading(f"{name}-{first}{word}-{then}", gradients, tuple(then_strains), start=start))
+        rows.append(Loading(f"{name}-{first}{word}-{then}", gradients, then_strains, start=start))
     return tuple(rows)
 
 
@@ -61,8 +62,10 @@ def _gradient(strains: dict[str, float]) -> Gradient:
     return ((1.0 + x, 0.0), (shear, 1.0 + y))
 
 
-def _check_outwards(strains: Sequence[float], field: str) -> None:
-    """Refuse strains that do not go away from 0, each further than the one before: no state of a grid comes twice."""
+def _outwards(strains: object, field: str) -> tuple[float, ...]:
+    """Strains that go away from 0, each further than the one before, so that no state of a grid comes twice."""
+    strains = check_strains(strains, field)
     steps = [after - before for before, after in zip((0.0, *strains), strains, strict=False)]
     if not strains or not (min(steps) > 0.0 or max(steps) < 0.0):
-        raise refuse(field, tuple(strains), "strains of a grid go from 0 in one direction, each further than the last")
+        raise refuse(field, strains, "strains of a grid go from 0 in one direction, each further than the last")
+    return strains

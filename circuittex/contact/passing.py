@@ -112,15 +112,16 @@ def safe_step(table: CurveTable, radius: Floats, r: Floats, motion: Floats) -> S
     return SafeStep(float(found[0]), (pair[0], pair[1]), float(found[3]))
 
 
-def likely_cause(mesh: FibrilMesh, law: ContactLaw, first: int, second: int) -> str:
-    """Why contact by a law does not keep two fibrils apart, as the rest of a sentence."""
+def likely_cause(mesh: FibrilMesh, law: ContactLaw, first: int, second: int, modulus: float = 1.0) -> str:
+    """Why contact by a law does not keep two fibrils apart, to end a sentence; `modulus` N/mm2 are one of the mesh."""
     one, other = np.array([first]), np.array([second])
     e, nu = mesh.youngs_modulus, mesh.poisson_ratio
     penalty = float(pair_penalty(mesh, law, one, other)[0])
     hertz = float(hertz_penalty(effective_modulus(e[one], nu[one], e[other], nu[other]))[0])
     if penalty < SOFT * hertz:
         return (
-            f"the penalty of {penalty:.3g} N/mm2 is too soft for them: Hertz's theory gives {hertz:.3g} N/mm2, "
+            f"the penalty of {modulus * penalty:.3g} N/mm2 is too soft for them: "
+            f"Hertz's theory gives {modulus * hertz:.3g} N/mm2, "
             'which penalty = "hertz" asks for'
         )
     return "they are pressed together further than contact can hold: load them less, or in smaller steps"

@@ -89,6 +89,8 @@ class PenaltyContact:
         size = mesh.length / np.diff(mesh.first_element) / per_element
         self.weight = size / 2  # half: the pair is integrated from both sides
         self.fibrils = Fibrils(mesh.radius, mesh.first_node, self.table.first_interval, self.table.fibril)
+        self.modulus = 1.0
+        """N/mm2 in one unit of modulus: what messages multiply by where the fibrils are in units of their own."""
         self._held: tuple[Candidates, Floats] | None = None
         """What the pattern has room for, and the nodes (N, 3) for which it was searched."""
         self._tried: tuple[Candidates, Floats] | None = None
@@ -181,7 +183,7 @@ class PenaltyContact:
         step = safe_step(self.table, mesh.radius, self.positions(q), self.positions(direction))
         if step.fraction < 1.0 and step.distance < PRESSED * mesh.radius[list(step.fibrils)].sum():
             what = f"{pair_label(mesh, *step.fibrils)} are pressed through one another"
-            raise PenetrationError(f"{what}; {likely_cause(mesh, self.law, *step.fibrils)}")
+            raise PenetrationError(f"{what}; {likely_cause(mesh, self.law, *step.fibrils, self.modulus)}")
         return step.fraction
 
     def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:

@@ -43,6 +43,8 @@ class Key:
     """The value in the starter design, as TOML."""
     note: str
     """What it is, in words that fit behind it on a line."""
+    unit: str = "1"
+    """What its number is measured in; "1" for pure ones, texts and the rest."""
 
 
 def number(
@@ -75,7 +77,7 @@ def number(
     limits += [f"<= {at_most:g}"] * (at_most < inf)
     allowed = ", ".join([*(f'"{word}"' for word in words), " and ".join(limits) or "any"])
     text = shown if _is_plain(shown) else f'"{shown}"'
-    return _metadata(check, read, wanted, f"{allowed} {shown_unit}".strip(), text, note)
+    return _metadata(check, read, wanted, f"{allowed} {shown_unit}".strip(), text, note, unit)
 
 
 def relative(unit: str, note: str, *, shown: str, at_most: float) -> Mapping[str, Key]:
@@ -215,8 +217,10 @@ def reference_table(kind: type) -> str:
     return "\n".join(rows)
 
 
-def _metadata(read_check: Check, read_value: Check, wanted: str, allowed: str, shown: str, note: str) -> dict[str, Key]:
-    return {_KEY: Key(read_check, read_value, wanted, allowed, shown, note)}
+def _metadata(
+    read_check: Check, read_value: Check, wanted: str, allowed: str, shown: str, note: str, unit: str = "1"
+) -> dict[str, Key]:
+    return {_KEY: Key(read_check, read_value, wanted, allowed, shown, note, unit)}
 
 
 def _as_it_is(value: object, field: str) -> object:

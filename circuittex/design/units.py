@@ -87,6 +87,16 @@ def parse(value: float | int | str, unit: str, field: str) -> float:
     return number
 
 
+def newtons_and_millimetres(unit: str) -> tuple[int, int] | None:
+    """(a, b) of a unit of dimension N^a mm^b; None where it is none.
+
+    >>> newtons_and_millimetres("MPa"), newtons_and_millimetres("S/mm")
+    ((1, -2), None)
+    """
+    metres, kilograms, seconds, amperes, kelvins = _read(unit)[1]
+    return None if amperes or kelvins or seconds != -2 * kilograms else (kilograms, metres - kilograms)
+
+
 def _from_text(text: str, unit: str, field: str) -> float:
     if len(text) > _LONGEST:
         raise DesignError(field, text[:40] + "...", _wanted(unit))

@@ -201,7 +201,7 @@ def minimise(
         residual, limits = float(left.max()), system.limits(q, tolerance, force_tolerance)
         history.append((residual, energy, shift, step))
         if report is not None:
-            report(iteration, residual)
+            report(iteration, scales.newtons * residual)
         if not np.isfinite(energy):
             raise ConvergenceError("the potential is infinite: a fibril's section is inside out", np.array(history))
         balanced = bool((left <= limits).all())
@@ -241,6 +241,7 @@ def minimise(
     trouble = "the forces balance, but the tangent is not positive definite: a saddle, not a minimum"
     if not balanced:
         worst = int(np.argmax(left - limits))
+        left, limits = scales.newtons * left, scales.newtons * limits
         trouble = f"a free force of {left[worst]:.3g} N is left, above the limit of {limits[worst]:.3g} N"
     raise ConvergenceError(f"no equilibrium after {len(history) - 1} iterations: {trouble}", np.array(history))
 

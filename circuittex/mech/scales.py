@@ -45,6 +45,8 @@ class Scales:
     """(F + 1,) offsets of the fibrils into the nodes."""
     metric: Callable[[Pattern], Floats]
     """The stiffness that a shift multiplies, in a pattern: N/mm for positions, N mm for directors."""
+    newtons: float = 1.0
+    """N in one unit of force: 1, or what messages multiply by where the fibrils are in units of their own."""
 
     @property
     def unit(self) -> Floats:

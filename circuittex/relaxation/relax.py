@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from circuittex.base.arrays import Floats
+from circuittex.base.errors import ConvergenceError
 from circuittex.base.frozen import frozen, same
 from circuittex.contact.law import largest_penalty
 from circuittex.contact.penalty import PenaltyContact
 from circuittex.design import Design
+from circuittex.design.restated import restated
 from circuittex.geometry.mesh import FibrilMesh
+from circuittex.geometry.weave import build_mesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.mech.linear import LinearSolver
@@ -20,6 +24,7 @@ from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.scales import fibril_scales
 from circuittex.mech.space import BeamSpace, beam_space
 from circuittex.relaxation.continuation import continued
+from circuittex.relaxation.units import PLAIN, Units, own_units
 
 ROUGHLY = 1e-3
 """Tolerance of a descent with softer contacts than there are, which only leads near a minimum."""
@@ -67,15 +72,50 @@ def relax(
     """The equilibrium that descent from `start` (by default the initial weave) reaches, ends held as there.
 
     Where `start` was moved from the equilibrium `before`, the descent starts from what that predicts. The
-    ends of yarns along `free_edges`, 'x' or 'y', are not held.
+    ends of yarns along `free_edges`, 'x' or 'y', are not held. From the initial weave of the design the descent
+    is made in units of its own fibrils (`own_units`).
 
     Raises `ConvergenceError` with the history where it is not reached.
     """
+    woven, solver = initial_configuration(mesh), solver if solver is not None else MultifrontalSolver()
+    start, units = start if start is not None else woven, own_units(mesh, design)
+    regular = before is None and same(start, woven) and same(mesh, build_mesh(design))
+    if not regular or units == PLAIN:
+        return _relaxed(mesh, design, start, before, free_edges, solver, report, PLAIN)
+    own = restated(design, units.length, units.modulus)
+    there = build_mesh(own)
+    try:
+        found = _relaxed(there, own, initial_configuration(there), None, free_edges, solver, report, units)
+    except ConvergenceError as error:
+        error.history = units.history(error.history)
+        raise
+    configuration = units.configuration(found.configuration, woven, beam_space(mesh, free_edges).fixed)
+    return Equilibrium(
+        configuration=configuration,
+        reaction=found.reaction * units.force,
+        section_force=found.section_force * units.force,
+        energy=found.energy * units.energy,
+        residual=found.residual * units.force,
+        iterations=found.iterations,
+        history=units.history(found.history),
+    )
+
+
+def _relaxed(
+    mesh: FibrilMesh,
+    design: Design,
+    start: Configuration,
+    before: Configuration | None,
+    free_edges: str,
+    solver: LinearSolver,
+    report: Callable[[int, float], None] | None,
+    units: Units,
+) -> Equilibrium:
+    """The same in the units that mesh and design are in; `units` is what those are, for messages."""
     space, beam, contact = force_terms(mesh, design, free_edges)
-    start = start if start is not None else initial_configuration(mesh)
-    moved = before is not None and not same(before, start)
-    numerics, solver = design.numerics, solver if solver is not None else MultifrontalSolver()
+    contact.modulus, moved, numerics = units.modulus, before is not None and not same(before, start), design.numerics
     scales = fibril_scales(space, design.weave.least_pitch, largest_penalty(mesh, design.contact))
+    scales = replace(scales, newtons=units.force)
 
     def descend(q: Floats, part: float, may_creep: bool) -> Minimum:
         contact.part, true = part, part == 1.0

@@ -32,6 +32,8 @@ PROBES = (
     Probe("perpendicular", "perpendicular", "right", 1e-3),
 )
 RAILS = (Terminal("one", (("warp1", -1),)), Terminal("other", (("warp2", -1),)))
+ROUNDING = "ngspice's own rounding limits this check"
+"""What is said where that may exceed 1e-9; it comes near that in these states."""
 BETWEEN = Probe("between", "one", "other", 1.0)
 
 
@@ -52,7 +54,8 @@ def test_three_routes_agree(seed: int) -> None:
     found = verify(state, simplified(state), TERMINALS, PROBES)
     assert found.routes == ("fields", "nodal", "ngspice")
     assert found.ngspice_checked
-    assert found.note == ""
+    assert found.agrees
+    assert not found.note or found.note.startswith(ROUNDING)
     assert 0 < found.max_voltage_difference < 1e-9
     assert 0 < found.max_current_difference < 1e-9
     assert 0 < found.merge_error < 1e-2
@@ -75,7 +78,8 @@ def test_conduction_that_varies_and_fibrils_that_do_not_conduct() -> None:
     )
     found = verify(hard, simplified(hard), TERMINALS, PROBES)
     assert found.ngspice_checked
-    assert found.note == ""
+    assert found.agrees
+    assert not found.note or found.note.startswith(ROUNDING)
     assert max(found.max_voltage_difference, found.max_current_difference) < 1e-9
     fields = solve_fields(hard, TERMINALS, PROBES[1])
     circuit = build_circuit(hard, TERMINALS[1:3])

@@ -16,6 +16,10 @@ MOST_OPEN = 1e5
 STIFFEST, HEAVIEST, MOST_CONDUCTIVE, THICKEST = 1e9, 1e6, 1e9, 1e4
 """MPa, g/mm3, S/mm and W/(mm K), mm: a thousand times and more beyond diamond, osmium, silver and a ship's rope, which
 leaves room for designs in units of another scale and none for slips of the pen."""
+PATH = "path"
+"""A crimp such that the natural length is that of the woven path."""
+SHORTEST, LONGEST = -0.3, 3.0
+"""Crimps: from fibrils that the loom stretched by half to the crimp of a terry loop."""
 STEEPEST = 0.0099
 """1/K: with this tc1, or its square as tc2, a resistance stays positive as far as 50 K from 27 C."""
 
@@ -121,6 +125,32 @@ class Yarn:
     """Vertical distance of neighbouring rows, mm."""
     materials: tuple[Material, ...]
     """One for each fibril."""
+    crimp: float | str = field(
+        default=0.0,
+        kw_only=True,
+        metadata=number(
+            "1",
+            'natural length of its fibrils over the span, less 1; "path": as long as they are woven, so that none is '
+            "stretched",
+            shown="0 %",
+            at_least=SHORTEST,
+            at_most=LONGEST,
+            words=(PATH,),
+        ),
+    )
+    """Natural length of the fibrils over the straight span, less 1: what is woven in; 'path': that of the path."""
+    heat_set: float = field(
+        default=0.0,
+        kw_only=True,
+        metadata=number(
+            "1",
+            "part of the woven bends that is natural: 0 for straight fibrils, 1 for a yarn set in its weave",
+            shown="0.0",
+            at_least=0,
+            at_most=1,
+        ),
+    )
+    """Part of the woven bends in the natural shape: the angle between a fibril and its yarn's axis is times this."""
 
     def __post_init__(self) -> None:
         at = f"yarns.{name(self.name, 'yarns')}"

@@ -55,6 +55,8 @@ class FibrilMesh:
     """(F,) place of each fibril's material in `material_names`; empty where no contact law asks for it."""
     material_names: tuple[str, ...] = ()
     """Names of the materials, in the order of their first fibrils."""
+    natural: Floats = field(default_factory=lambda: np.empty((0, 3, 3)))
+    """(N, 3, 3) r, mm, g1 and g2 of the stress-free shapes; empty where every fibril is naturally straight."""
 
     @property
     def order(self) -> int:

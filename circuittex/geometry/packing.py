@@ -48,11 +48,12 @@ def places_in_yarn(weave: Weave, packing: Packing, draws: Draws, t: Floats) -> t
 
         d(t) = sigma / sqrt(n + 1) (c + sum_k (a_k cos(pi k t) + b_k sin(pi k t))),  k = 1 .. n
 
-    at `t` (K,) = xi3 / L from 0 to 1, with standard normal c, a_k, b_k and n the crossings of the yarn. The standard
-    deviation of d is sigma everywhere, and its shortest wave is two pitches long, as the yarn's own.
+    at `t` from 0 to 1 along the span, (K,) for all or (F, K), with standard normal c, a_k, b_k and n the crossings of
+    the yarn. The standard deviation of d is sigma everywhere, and its shortest wave is two pitches long, as the yarn's
+    own.
     """
     sigma = np.array([packing.lateral, packing.vertical])
-    directions = []
+    directions, fibril = [], 0
     # A right-handed screw turns towards the left of one who looks along the yarn: y for the warp, -x for the weft.
     for direction, first, left, modes in zip(
         weave.directions, (0, len(weave.warp)), (1.0, -1.0), draws.modes, strict=True
@@ -60,15 +61,17 @@ def places_in_yarn(weave: Weave, packing: Packing, draws: Draws, t: Floats) -> t
         yarns, length = direction.yarns, direction.crossings * direction.step
         turns = left * packing.twist * draws.twist[first : first + len(yarns)]
         rate = 2.0 * np.pi * np.repeat(turns, [yarn.n_fibrils for yarn in yarns])
-        place, slope = _turned(np.concatenate([section_offsets(yarn) for yarn in yarns]), rate, length * (t - 0.5))
-        offset, offset_slope = _waves(modes, t)
+        own = t if t.ndim == 1 else t[fibril : fibril + len(rate)]
+        fibril += len(rate)
+        place, slope = _turned(np.concatenate([section_offsets(yarn) for yarn in yarns]), rate, length * (own - 0.5))
+        offset, offset_slope = _waves(modes, own)
         directions.append((place + sigma * offset, slope + sigma * offset_slope / length))
     places, slopes = zip(*directions, strict=True)
     return np.concatenate(places), np.concatenate(slopes)
 
 
 def _turned(section: Floats, rate: Floats, s: Floats) -> tuple[Floats, Floats]:
-    """(F, K, 2) places `section` (F, 2) turned by `rate` (F,) times `s` (K,), and the derivative with s."""
+    """(F, K, 2) places `section` (F, 2) turned by `rate` (F,) times `s` (K,) or (F, K), and the derivative with s."""
     angle = rate[:, None] * s
     cosine, sine = np.cos(angle), np.sin(angle)
     across, height = section[:, :1], section[:, 1:]
@@ -80,10 +83,11 @@ def _waves(modes: Floats, t: Floats) -> tuple[Floats, Floats]:
     """(F, K, 2) displacements of unit standard deviation with amplitudes `modes`, and their derivative with t."""
     n = (modes.shape[-1] - 1) // 2
     wave = np.pi * np.arange(1, n + 1)
-    cosine, sine = np.cos(wave * t[:, None]), np.sin(wave * t[:, None])
-    values = np.concatenate([np.ones((len(t), 1)), cosine, sine], axis=1)
-    slopes = np.concatenate([np.zeros((len(t), 1)), -wave * sine, wave * cosine], axis=1)
-    offset, slope = (np.einsum("km,fcm->fkc", table, modes) / np.sqrt(n + 1.0) for table in (values, slopes))
+    cosine, sine = np.cos(wave * t[..., None]), np.sin(wave * t[..., None])
+    values = np.concatenate([np.ones((*t.shape, 1)), cosine, sine], axis=-1)
+    slopes = np.concatenate([np.zeros((*t.shape, 1)), -wave * sine, wave * cosine], axis=-1)
+    sums = "km,fcm->fkc" if t.ndim == 1 else "fkm,fcm->fkc"
+    offset, slope = (np.einsum(sums, table, modes) / np.sqrt(n + 1.0) for table in (values, slopes))
     return offset, slope
 
 

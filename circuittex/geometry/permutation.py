@@ -33,6 +33,7 @@ def permuted(mesh: FibrilMesh, permutation: Ints) -> tuple[FibrilMesh, Ints]:
         position=mesh.position[nodes],
         directors=mesh.directors[nodes],
         xi=mesh.xi[nodes],
+        natural=mesh.natural[nodes] if len(mesh.natural) else mesh.natural,
         elements=place[mesh.elements[old]],
         first_node=np.concatenate([[0], np.cumsum(counts)]),
         first_element=np.concatenate([[0], np.cumsum(elements)]),

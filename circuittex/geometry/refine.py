@@ -38,6 +38,7 @@ def refined(mesh: FibrilMesh, pieces: int) -> FibrilMesh:
         position=between(mesh.position),
         directors=between(mesh.directors),
         xi=between(mesh.xi),
+        natural=between(mesh.natural) if len(mesh.natural) else mesh.natural,
         elements=np.column_stack([left, left + 1]),
         first_node=first,
         first_element=first - np.arange(len(first)),

@@ -53,6 +53,7 @@ def build_mesh(design: Design) -> FibrilMesh:
         yarn_axis=np.repeat([0, 1], [len(weave.warp), len(weave.weft)]),
         material=np.array([names.index(material.name) for material in materials]),
         material_names=tuple(names),
+        natural=lines.natural.reshape(-1, 3, 3),
     )
 
 

@@ -54,7 +54,8 @@ def force_terms(mesh: FibrilMesh, design: Design, free_edges: str = "") -> tuple
     """The space of the fibrils and the two force terms, elasticity and contact, that a design asks for."""
     numerics = design.numerics
     space = beam_space(mesh, free_edges)
-    beam = Beam(space, degree=numerics.section_degree)
+    natural = Configuration(mesh.natural) if len(mesh.natural) else None
+    beam = Beam(space, degree=numerics.section_degree, natural=natural)
     contact = PenaltyContact(mesh, law=design.contact, per_element=design.resolution.contact_points)
     return space, beam, contact
 

@@ -7,6 +7,7 @@ import numpy as np
 from circuittex.base.arrays import Floats
 from circuittex.base.frozen import frozen
 from circuittex.contact.state import ContactState
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results.records import Record, Study
 
 HOT = 300.0
@@ -54,17 +55,23 @@ def surface_stress(record: Record) -> Floats:
     """(M,) largest axial stress at the surface of each element, MPa: sigma = |N| / A + E R kappa.
 
     The curvature is that of the directors along the element, kappa_a = g_a' . t with the unit tangent t of the centre
-    line [9], kappa = sqrt(kappa_1^2 + kappa_2^2), per length of the natural, straight fibril; the element's mean.
+    line [9], less that of the natural shape, kappa = sqrt(kappa_1^2 + kappa_2^2), per natural length; the element's
+    mean.
     """
     mesh = record.contacts.mesh
-    first, last = mesh.elements[:, 0], mesh.elements[:, -1]
-    slope = (record.configuration.x[last] - record.configuration.x[first]) / (mesh.xi[last] - mesh.xi[first])[
-        :, None, None
-    ]
-    tangent = slope[:, 0] / np.linalg.norm(slope[:, 0], axis=1)[:, None]
-    curvature = np.linalg.norm(np.einsum("mac,mc->ma", slope[:, 1:], tangent), axis=1)
-    fibril = mesh.element_fibril
+    bends = _bends(mesh, record.configuration.x)
+    if len(mesh.natural):
+        bends = bends - _bends(mesh, mesh.natural)
+    fibril, curvature = mesh.element_fibril, np.linalg.norm(bends, axis=1)
     return np.asarray(section_stress(record) + mesh.youngs_modulus[fibril] * mesh.radius[fibril] * curvature)
+
+
+def _bends(mesh: FibrilMesh, x: Floats) -> Floats:
+    """(M, 2) mean curvatures kappa_1 and kappa_2 of each element, 1/mm, of nodal values x (N, 3, 3)."""
+    first, last = mesh.elements[:, 0], mesh.elements[:, -1]
+    slope = (x[last] - x[first]) / (mesh.xi[last] - mesh.xi[first])[:, None, None]
+    tangent = slope[:, 0] / np.linalg.norm(slope[:, 0], axis=1)[:, None]
+    return np.asarray(np.einsum("mac,mc->ma", slope[:, 1:], tangent))
 
 
 def points_across(contacts: ContactState) -> float:

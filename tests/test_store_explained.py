@@ -31,6 +31,7 @@ PURE = {
     *("Verification.native_limit", "Fit.pair_errors", "Numerics.drop_fraction", "Numerics.tolerance"),
     *("Numerics.overlap_warning", "Numerics.overlap_limit", "ContactLaw.exponent", "MaterialPair.exponent"),
     *("Material.tolerance", "ContactLaw.tolerance", "MaterialPair.tolerance", "Yarn.crimp", "Yarn.heat_set"),
+    "Electrical.permittivity",
 }
 """Every field with pure numbers that are no counts. A field that is not here names its unit in the text below it."""
 

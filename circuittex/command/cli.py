@@ -267,6 +267,7 @@ def _export(options: argparse.Namespace) -> ExitCode:
         rise=options.rise,
         combine=tuple(filter(None, options.combine.split(","))),
         members=complete_members(options.results) if several else (),
+        reactive=options.reactive,
     )
     print(f"{len(cells)} sub-circuits in {options.out}: see {options.out / 'datasheet.html'}")
     if options.kit:

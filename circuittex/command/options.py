@@ -247,6 +247,11 @@ def _add_export(commands: Commands) -> None:
         "missing states where the study has no complete grid of both (where it has, the part is there anyway)",
     )
     parser.add_argument(
+        "--reactive",
+        action="store_true",
+        help="give every part the capacitances between its yarns and their inductances, to first order",
+    )
+    parser.add_argument(
         "--kit",
         action="store_true",
         help="write also DIR/kit: circuits of three sizes with their answers, to check any other simulator by",

@@ -48,6 +48,19 @@ class Electrical:
         default=True, metadata=flag("whether the Joule heat of the contacts warms the fibrils", shown=True)
     )
     """Whether the Joule heat of the contacts warms the fibrils, half to each side."""
+    permittivity: float = field(
+        default=1.0,
+        kw_only=True,
+        metadata=number(
+            "1",
+            "of what is between the yarns, relative to the vacuum, for capacitances of exported parts only; air 1, "
+            "polyester 3, skin some 1e3",
+            shown="1.0",
+            at_least=1,
+            at_most=1e5,
+        ),
+    )
+    """Relative permittivity of what is between the yarns, for capacitances of exported parts."""
 
     fit: str = field(
         default="auto",

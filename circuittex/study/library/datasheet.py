@@ -21,6 +21,7 @@ from circuittex.study.library.facts import GOOD, Facts
 from circuittex.study.library.figures import save_figures
 from circuittex.study.library.network import Network, matrix_at
 from circuittex.study.library.parts import Part
+from circuittex.study.library.reactive import YarnReactances
 from circuittex.study.library.reduction import CORNERS
 from circuittex.study.library.resistivity import differs
 
@@ -35,8 +36,8 @@ NO_GRID = {
 }
 NO_CORNERS = {"Corners and Monte Carlo": "not available: the library is made of one study, not of an ensemble"}
 NO_TEMPERATURE = {"Temperature coefficient": "not available: the design states no tc1, tc2"}
+NO_REACTANCE = {"Capacitance, inductance": "not asked for: circuittex export --reactive"}
 MISSING = {
-    "Capacitance, inductance": "not available: the model has no answer",
     "Power rating": "the rated current squared times the resistance of the probe",
 }
 
@@ -48,6 +49,7 @@ def write_datasheet(
     cells: Sequence[Cell],
     networks: Mapping[str, Network],
     parts: Sequence[Part],
+    yarns: YarnReactances | None,
 ) -> Path:
     """Draw the figures into ``folder/figures`` and write ``folder/datasheet.html``; returns its path."""
     pictures = save_figures(known, folder / "figures")
@@ -65,7 +67,8 @@ def write_datasheet(
         ratings=_ratings(study, known),
         rise=number(known.rise),
         warmth=_warmth(parts),
-        missing=_missing(study, known),
+        reactances=_reactances(known, yarns),
+        missing=_missing(study, known) | (NO_REACTANCE if yarns is None else {}),
         figures=[picture(CAPTIONS[name], png) for name, png in pictures.items()],
         version=study.version,
     )
@@ -77,6 +80,30 @@ def _missing(study: Study, known: Facts) -> dict[str, str]:
     corners = {} if any(each.end in CORNERS for each in known.reductions) else NO_CORNERS
     grids = {} if known.grids else NO_GRID
     return corners | grids | ({} if differs(study.design, "tc1", "tc2") else NO_TEMPERATURE) | MISSING
+
+
+def _reactances(known: Facts, yarns: YarnReactances | None) -> dict[str, Any]:
+    """Inductance of each yarn, its largest capacitance to another, and where they come to count beside resistance."""
+    head = ["yarn", "inductance (nH)", "largest capacitance to another yarn (fF)", "to", "R / (2 pi L) (MHz)"]
+    rows: list[list[str]] = []
+    if yarns is None:
+        return {"head": head, "rows": rows}
+    names = [end.removesuffix("_minus") for end in yarns.ends[::2]]
+    n = len(names)
+    farad = np.array(yarns.farad).reshape(n, 2, n, 2).sum(axis=(1, 3))
+    np.fill_diagonal(farad, 0.0)
+    port = known.levels.ports[0]
+    for k, name in enumerate(names):
+        nearest, corner = int(np.argmax(farad[k])), "-"
+        ends = [f"{name}_minus", f"{name}_plus"]
+        if set(ends) <= set(port.ports):
+            i, j = (port.ports.index(each) for each in ends)
+            G = np.delete(np.delete(port.conductance, j, axis=0), j, axis=1)
+            ohm = float(np.linalg.pinv(G)[i - (i > j), i - (i > j)])
+            corner = number(1e-6 * ohm / (2 * np.pi * yarns.henry[k]), 3)
+        capacitance = number(1e15 * farad[k, nearest], 3) if n > 1 else "-"
+        rows.append([name, number(1e9 * yarns.henry[k], 3), capacitance, names[nearest] if n > 1 else "-", corner])
+    return {"head": head, "rows": rows}
 
 
 def _warmth(parts: Sequence[Part]) -> dict[str, Any]:

@@ -27,6 +27,7 @@ from circuittex.study.library.grid_parts import grid_parts
 from circuittex.study.library.levels import CRIMPED, ENDS, FREE, detailed, levels, port_matrices
 from circuittex.study.library.network import Network, farthest, floating
 from circuittex.study.library.parts import Part, fixed_parts, strained_parts
+from circuittex.study.library.reactive import YarnReactances, of_cell, of_unit, yarn_reactances
 from circuittex.study.library.reduction import exact
 from circuittex.study.library.resistivity import Factor, as_stated, differs, warmer
 from circuittex.study.library.subcircuit import library_text
@@ -50,6 +51,7 @@ def export_library(
     rise: float = 10.0,
     combine: Sequence[str] = (),
     members: Iterable[Study] = (),
+    reactive: bool = False,
 ) -> tuple[Cell, ...]:
     """Write the sub-circuits of a study into `folder`, with symbols, library.json, examples and datasheet.html.
 
@@ -58,11 +60,15 @@ def export_library(
     with fewer resistors, whose resistances rise by at most that part. Ratings are for `rise` kelvin.
     Two strains, of `strain_grid.AXES`, are inputs of one part where the study has all states of a grid of them; with
     `combine`, the names of both, it is an error where it has not.
-    `members` of an ensemble, `study` among them, give corners: see `reduction.corners`.
+    `members` of an ensemble, `study` among them, give corners: see `reduction.corners`. With `reactive` every part
+    has capacitors between its pins and inductors behind them, of the chosen state (`electrical.network.reactance`).
 
     Raises `DesignError` for an argument and `CircuitError` for a study that cannot be used.
     """
     chosen = _checked(study, state, ends, thin, dialects, rise)
+    if reactive and ends != CRIMPED:
+        raise DesignError("reactive", reactive, f"it needs {CRIMPED} yarn ends: capacitances are those of whole yarns")
+    yarns = yarn_reactances(study.design, study.records[chosen]) if reactive else None
     _note_missing(study)
     known = facts_of(study, ends, thin, rise, members, combine)
     word = safe_name(name) + ("_free" if ends == FREE else "")
@@ -71,7 +77,7 @@ def export_library(
         found = _with_temperature(study, known, word, chosen, ends, found)
     folder = Path(folder)
     cells = [
-        _write(folder, study, known, part, dialect, chosen)
+        _write(folder, study, known, part, dialect, chosen, yarns)
         for dialect in dialects
         for part in found
         if SYNTAX[dialect].expression or not any(pin.kind == "control" for pin in part.pins)
@@ -80,7 +86,7 @@ def export_library(
     _write_examples(folder / "examples", cells, networks)
     _write_probes(folder / "examples", study, chosen)
     write_symbols(folder, word, study.design.name, cells, networks)
-    write_datasheet(folder, study, known, cells, networks, found)
+    write_datasheet(folder, study, known, cells, networks, found, yarns)
     library = {
         "format": FORMAT,
         "circuittex": __version__,
@@ -157,14 +163,21 @@ def _parts(study: Study, known: Facts, word: str, chosen: int, ends: str, factor
         yield from grid_parts(word, design, known.levels, known.reductions, grid)
 
 
-def _write(folder: Path, study: Study, known: Facts, part: Part, dialect: str, chosen: int) -> Cell:
+def _write(
+    folder: Path, study: Study, known: Facts, part: Part, dialect: str, chosen: int, yarns: YarnReactances | None
+) -> Cell:
     """Write the file of one sub-circuit in one dialect."""
+    elements = None
+    if yarns is not None:
+        elements = of_unit(yarns, study.design) if part.level == "unit" else of_cell(yarns, part.network.pins)
     cell = Cell(part.name, part.level, part.title, part.pins, part.parameters, f"{dialect}/{part.name}.lib", dialect)
     state = f"strain of {part.path}" if part.path else study.records[chosen].name
     notes = [("design", study.design.name), ("design hash", study.design_hash), ("state", state), *known.notes(part)]
+    if yarns is not None:
+        notes.append(("capacitance, inductance", f"to first order, of state {study.records[chosen].name}"))
     path = folder / cell.file
     path.parent.mkdir(parents=True, exist_ok=True)
-    _write_ascii(path, library_text(cell, part.network, notes, part.spread))
+    _write_ascii(path, library_text(cell, part.network, notes, part.spread, elements))
     return cell
 
 

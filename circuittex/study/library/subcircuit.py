@@ -18,6 +18,7 @@ from circuittex.study.library.dialect import DIALECTS, Dialect
 from circuittex.study.library.interpolation import Pieces, pieces
 from circuittex.study.library.network import FLAG, SPREAD, SPREAD_USED, STRAIN, USED, Axis, Network
 from circuittex.study.library.polynomial import cubic, patch_of, piece_of
+from circuittex.study.library.reactive import Reactive, within
 
 SLACK = 1e-6
 """A strain this part of the range beyond its ends is at the end: a source's rounding raises no flag."""
@@ -36,12 +37,13 @@ def library_text(
     network: Network,
     notes: Sequence[tuple[str, str]],
     spread: tuple[Network, Network] | None = None,
+    reactive: Reactive | None = None,
 ) -> str:
     """One file: comments with `notes` (key, text) of which no text can become a card, then the sub-circuit.
 
     `spread`: the networks at the 5th and 95th percentile of resistance, where the place among them is a parameter.
     """
-    body = "\n".join(_subcircuit(cell, network, spread))
+    body = "\n".join(_subcircuit(cell, network, spread, reactive))
     digest = hashlib.sha256(body.encode("ascii")).hexdigest()
     head = [
         f"* circuittex {__version__} library: {cell.name}",
@@ -53,12 +55,17 @@ def library_text(
     return "\n".join([*head, body, ""])
 
 
-def _subcircuit(cell: Cell, network: Network, spread: tuple[Network, Network] | None) -> list[str]:
+def _subcircuit(
+    cell: Cell, network: Network, spread: tuple[Network, Network] | None, reactive: Reactive | None
+) -> list[str]:
     dialect = DIALECTS[cell.dialect]
     card = [".subckt", cell.name, *(pin.name for pin in cell.pins)]
     if cell.parameters:
         card.append(dialect.parameters + " ".join(f"{name}={value}" for name, value in cell.parameters))
     lines = [" ".join(card), *(f"* pin: {pin.name} {pin.kind} {pin.side}" for pin in cell.pins)]
+    if reactive is not None:
+        network, cards = within(network, reactive)
+        lines += cards
     if len(network.strain) == 1:
         lines += _fixed(network)
     elif spread is not None:

@@ -14,7 +14,7 @@ from gnucap import needs_gnucap
 from library_cases import listed, ohmmeter, pins_of, resistor_matrix, study
 
 from circuittex.base.arrays import Floats
-from circuittex.design import Design
+from circuittex.design import Design, Yarn
 from circuittex.electrical.network.circuit import build_circuit, yarn_end_terminals
 from circuittex.electrical.network.ports import PortMatrix, port_matrix, resistances
 from circuittex.electrical.spice.ngspice import run_deck
@@ -53,7 +53,7 @@ def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("circuittex.study.library.export.write_datasheet", lambda *_: None)
 
 
-def truth(design: Design, made: Study, state: int, fibril: float, contact: float) -> Floats:
+def truth(design: Design, made: Study, state: int, fibril: float | Floats, contact: float) -> Floats:
     """Resistances with conductivities divided by these factors, by a circuit made of them."""
     simple = simplified(design, made.records[state].contacts).contacts
     mesh = replace(simple.mesh, electrical_conductivity=simple.mesh.electrical_conductivity / fibril)
@@ -162,3 +162,93 @@ def test_tolerances_bound_every_resistance(tmp_path: Path, monkeypatch: pytest.M
         whole = truth(made.design, made, 0, factor, factor)
         pins = tuple(str(k) for k in range(len(G)))
         np.testing.assert_allclose(resistances(PortMatrix(pins, G)), whole, rtol=1e-9)  # rounding of two eliminations
+
+
+@pytest.mark.parametrize("tol", [-1.0, -0.5, 0.0, 0.3, 1.0, 4.0])
+def test_one_tolerance_for_all_is_a_parameter(tol: float, tolerated: tuple[Path, Study]) -> None:
+    """All resistivities within 10 % alike: every resistance is times 1 + 0.1 tol, tol held to -1 and 1."""
+    folder, made = tolerated
+    whole = truth(made.design, made, 0, 1.0, 1.0)
+    pins = pins_of((folder / "ngspice" / "fabric_ports.lib").read_text("ascii"))
+    wanted = np.array([whole[pins.index(a), pins.index(b)] for a, b in PAIRS]) * (1 + 0.1 * min(tol, 1.0))
+    decks = ohmmeter(folder / "ngspice", "fabric_ports_tol", PAIRS, f"tol={tol}")
+    found = [float(run_deck(deck).plots[-1].voltage(["in"])[-1, 0]) for deck in decks]
+    np.testing.assert_allclose(found, wanted, rtol=EXACT)
+
+
+def test_tolerance_and_strain_are_parameters_together(tolerated: tuple[Path, Study]) -> None:
+    folder, made = tolerated
+    whole = truth(made.design, made, 1, 1.0, 1.0)
+    pins = pins_of((folder / "ngspice" / "fabric_ports.lib").read_text("ascii"))
+    wanted = np.array([whole[pins.index(a), pins.index(b)] for a, b in PAIRS]) * 0.95
+    decks = ohmmeter(folder / "ngspice", "fabric_ports_tol_stretch_s", PAIRS, "strain=0.025 tol=-0.5")
+    found = [float(run_deck(deck).plots[-1].voltage(["in"])[-1, 0]) for deck in decks]
+    np.testing.assert_allclose(found, wanted, rtol=1e-6)  # what is asked of strain as an input
+
+
+@pytest.fixture(scope="module")
+def tolerated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Study]:
+    folder, made = tmp_path_factory.mktemp("tolerated"), warm_study((0.0, 0.0), (0.0, 0.0), tolerance=0.1)
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        without_pictures(monkeypatch)
+        export_library(made, folder, dialects=("ngspice",))
+    return folder, made
+
+
+def test_tolerances_that_differ_err_between_their_ends_by_what_the_file_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Fibrils by 20 %, contacts by 50 %: half way, against the circuit of those resistivities."""
+    without_pictures(monkeypatch)
+    made = warm_study((0.0, 0.0), (0.0, 0.0), tolerance=0.2)
+    made = replace(made, design=replace(made.design, contact=replace(made.design.contact, tolerance=0.5)))
+    export_library(made, tmp_path, dialects=("ngspice",))
+    text = (tmp_path / "ngspice" / "fabric_ports_tol.lib").read_text("ascii")
+    (said,) = re.findall(r"err by (\S+) at worst half way", text)
+    assert 0.0 < float(said) < 0.02
+    pins = pins_of(text)
+    for tol in (-0.5, 0.5):
+        whole = truth(made.design, made, 0, 1 + 0.2 * tol, 1 + 0.5 * tol)
+        wanted = np.array([whole[pins.index(a), pins.index(b)] for a, b in PAIRS])
+        decks = ohmmeter(tmp_path / "ngspice", "fabric_ports_tol", PAIRS, f"tol={tol}")
+        found = [float(run_deck(deck).plots[-1].voltage(["in"])[-1, 0]) for deck in decks]
+        np.testing.assert_allclose(found, wanted, rtol=1.05 * float(said) + EXACT)  # printed with two digits
+
+
+WARP = (0.0004, 0.0)
+"""tc1 and tc2 of the warp's fibrils in the mixed study: a tenth of those of the weft."""
+
+
+def mixed_study() -> Study:
+    """The warp of another material than the weft, and contacts of a third kind."""
+    made = warm_study(FIBRIL, CONTACT)
+
+    def renamed(yarn: Yarn) -> Yarn:
+        own = tuple(replace(m, name=f"{m.name}_warp", tc1=WARP[0], tc2=WARP[1]) for m in yarn.materials)
+        return replace(yarn, name=f"{yarn.name}_warp", materials=own)
+
+    weave = made.design.weave
+    return replace(made, design=replace(made.design, weave=replace(weave, warp=tuple(map(renamed, weave.warp)))))
+
+
+def test_a_sweep_of_temperature_with_two_materials(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`.dc temp` in ngspice, warp and weft and contacts each with a law of its own, against circuits of theirs."""
+    without_pictures(monkeypatch)
+    made = mixed_study()
+    export_library(made, tmp_path, dialects=("ngspice",))
+    n_warp, mesh = len(made.design.weave.warp), made.records[0].contacts.mesh
+    of_warp = mesh.yarn < n_warp
+    sweep = np.arange(-50.0, 75.0, 25.0)
+    for name in ("fabric_detailed", "fabric_ports"):
+        text = (tmp_path / "ngspice" / f"{name}.lib").read_text("ascii")
+        said = re.findall(r"errs by (\S+) at worst within 50 K", text)
+        pins = pins_of(text)
+        i, j = (pins.index(pin) for pin in PAIRS[1])
+        (deck,) = ohmmeter(tmp_path / "ngspice", name, PAIRS[1:2])
+        found = run_deck(deck.replace(".op\n", ".dc temp -23 77 25\n")).plots[-1].voltage(["in"])[:, 0]
+        wanted = [
+            truth(made.design, made, 0, np.where(of_warp, law(WARP, dT), law(FIBRIL, dT)), law(CONTACT, dT))[i, j]
+            for dT in sweep
+        ]
+        np.testing.assert_allclose(found, wanted, rtol=(1.05 * float(said[0]) if said else 0.0) + EXACT)
+        assert max(wanted) / min(wanted) > 1.05

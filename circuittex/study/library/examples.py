@@ -39,7 +39,11 @@ def _resistance(cell: Cell, ends: tuple[str, str], floating: Sequence[str]) -> s
 def _parameter(
     cell: Cell, ends: tuple[str, str], ranges: Sequence[tuple[float, float]], floating: Sequence[str]
 ) -> str:
-    what = f"{OHMMETER.format(*ends)}; at the lowest strain, amid the range, and beyond it, where the flag is up"
+    flagged = any(pin.kind == "flag" for pin in cell.pins)
+    where = "at the lowest strain, amid the range, and beyond it, where the flag is up"
+    what = (
+        f"{OHMMETER.format(*ends)}; {where if flagged else 'at the low end, amid, and beyond the high end, as at it'}"
+    )
     lines = []
     places = [(low, (low + high) / 2, 2 * high - low) for low, high in ranges]
     for number, strains in enumerate(zip(*places, strict=True), 1):
@@ -47,7 +51,8 @@ def _parameter(
         given = f" {DIALECTS[cell.dialect].parameters}{values}"
         lines += [f"V{number} in_{number} 0 1", _call(cell, ends, f"_{number}") + given]
         lines += _grounded(ends, floating, f"_{number}")
-    show = "i(V1) i(V2) i(V3) v(out_of_range_1) v(out_of_range_3)"
+    flags = " v(out_of_range_1) v(out_of_range_3)" if flagged else ""
+    show = f"i(V1) i(V2) i(V3){flags}"
     return _deck(cell, what, [*lines, f".print dc {show}", ".dc V1 1 1 1"])
 
 

@@ -187,7 +187,8 @@ def _write_examples(folder: Path, cells: Sequence[Cell], networks: Mapping[str, 
     for cell in cells:
         if cell.level != "detailed":
             network, (source, sink) = networks[cell.name], ends[cell.name]
-            ranges = [axis.range for axis in network.axes]
+            fixed = len(network.strain) == 1
+            ranges = [(-1.0, 1.0)] if fixed else [axis.range for axis in network.axes]
             text = example_deck(cell, (source, sink), ranges, floating(network, sink))
             _write_ascii(folder / f"{cell.dialect}_{cell.name}.cir", text)
 

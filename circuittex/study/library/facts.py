@@ -8,14 +8,14 @@ import numpy as np
 
 from circuittex.base.arrays import Floats
 from circuittex.base.frozen import frozen
-from circuittex.electrical.network.ports import port_matrix
+from circuittex.electrical.network.ports import PortMatrix, port_matrix
 from circuittex.results.records import Study
 from circuittex.study.library.accuracy import Errors, compared
 from circuittex.study.library.bicubic import left_out
 from circuittex.study.library.fit_corners import FitCorner, fit_corners
 from circuittex.study.library.interpolation import without
 from circuittex.study.library.levels import CRIMPED, Levels, levels, port_matrices
-from circuittex.study.library.network import matrix_at, ports_network
+from circuittex.study.library.network import WITHIN, matrix_at, ports_network
 from circuittex.study.library.parts import Part
 from circuittex.study.library.rating import rated_currents
 from circuittex.study.library.reduction import TOLERANCES, Reduction, corners, exact, thin, tolerances
@@ -55,6 +55,9 @@ class Facts:
     ends: str
     """'crimped' or 'free'."""
 
+    between_tolerances: float
+    """Largest relative error of a resistance between two pins in any state half way to an end of the tolerances."""
+
     @property
     def tolerance(self) -> tuple[float, float] | None:
         """Largest relative fall and rise of a resistance between two pins in any state; None where none is stated."""
@@ -78,6 +81,9 @@ class Facts:
             found.append(("errors over all pairs of pins and all states", _words(self.errors[level])))
         elif level == "ports":
             found.append(("errors", "none: the exact reduction of the detailed network to its pins"))
+        if part.end == f"_{WITHIN}":
+            text = f"exact at -1, 0 and 1; resistances err by {self.between_tolerances:.1e} at worst half way"
+            found.append((WITHIN, text))
         if part.path in self.left_out:
             found.append((f"errors of ports at {_which(part)}", _words(self.left_out[part.path])))
         if part.path:
@@ -118,15 +124,26 @@ def facts_of(
         fits.append(levels(member, ends))
     if packings:
         reductions += corners(packings)
+    between = 0.0
     if differs(study.design, "tolerance"):
-        reductions += tolerances(*(port_matrices(study, ends, known.pins, at_end(sign)) for sign in (-1.0, 1.0)))
+        at = {share: port_matrices(study, ends, known.pins, at_end(share)) for share in (-1.0, -0.5, 0.5, 1.0)}
+        reductions += tolerances(at[-1.0], at[1.0])
+        for end in (-1.0, 1.0):
+            middle = [_half_way(*pair) for pair in zip(known.ports, at[end], strict=True)]
+            between = max(between, compared(at[end / 2], middle).worst[0])
     ways = paths(study)
     left = {way.word: _left_out(known, way) for way in ways if len(way.strain) > 2}
     left |= {grid.word: _left_out_of_grid(known, grid) for grid in meshes if grid.records.size > 4}
     at_corners = fit_corners(known, fits)
-    return Facts(
-        known, tuple(reductions), at_corners, ways, meshes, errors, left, rise, rated_currents(study, rise), ends
-    )
+    rated = rated_currents(study, rise)
+    return Facts(known, tuple(reductions), at_corners, ways, meshes, errors, left, rise, rated, ends, between)
+
+
+def _half_way(one: PortMatrix, other: PortMatrix) -> PortMatrix:
+    """The ports whose resistors have the mean resistance of two."""
+    g, h = -one.conductance, -other.conductance
+    mean = np.divide(2.0 * g * h, g + h, out=np.zeros_like(g), where=(g > 0.0) & (h > 0.0))
+    return PortMatrix(one.ports, np.diag(mean.sum(axis=1)) - mean)
 
 
 def _left_out(known: Levels, way: StrainPath) -> Errors:

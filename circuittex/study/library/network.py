@@ -19,6 +19,8 @@ STRAIN, FLAG, USED = CONTROLS = ("strain", "out_of_range", "strain_used")
 """What drives a strained cell: the parameter or pin, the pin that flags, and the strain that is used inside."""
 SPREAD, SPREAD_USED = "mc", "mc_used"
 """The parameter that tells a place among the corners of an ensemble, and what is used of it."""
+WITHIN, WITHIN_USED = "tol", "tol_used"
+"""The parameter that tells a place within the tolerances, from -1 to 1, and what is used of it."""
 FLOOR = 1e-9
 """What opens in some states of a path and not in others keeps this part of its smallest conductance: the logarithm of
 none has no value between states, and a resistor that reaches none stops a transient."""

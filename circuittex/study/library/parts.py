@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -15,8 +15,17 @@ from circuittex.electrical.network.circuit import Circuit, yarn_end_name
 from circuittex.study.library.cell import Pin
 from circuittex.study.library.fit_corners import FitCorner
 from circuittex.study.library.levels import Levels
-from circuittex.study.library.network import FLAG, SPREAD, STRAIN, Network, circuit_network, pin_words, ports_network
-from circuittex.study.library.reduction import CORNERS, Reduction
+from circuittex.study.library.network import (
+    FLAG,
+    SPREAD,
+    STRAIN,
+    WITHIN,
+    Network,
+    circuit_network,
+    pin_words,
+    ports_network,
+)
+from circuittex.study.library.reduction import CORNERS, TOLERANCES, Reduction
 from circuittex.study.library.strain_path import StrainPath
 
 PARAMETER, PIN = "_s", "_v"
@@ -51,7 +60,8 @@ class Part:
     path: str
     """Word of the path or grid along which strain is an input; empty where it is none."""
     spread: tuple[Network, Network] | None = None
-    """The networks at the 5th and the 95th percentile of resistance, where the place among them is a parameter."""
+    """The networks at the 5th and the 95th percentile of resistance, or at the low and the high end of the tolerances,
+    where the place among them is a parameter."""
     drift: float = 0.0
     """Largest relative error of R(T)/R(27 C) between its pins within 50 K: see `temperature`."""
 
@@ -68,8 +78,11 @@ def fixed_parts(
     """Every level in one state; `circuit` is its detailed one."""
     nothing = np.zeros(1)
     yield _fixed(name, design, "detailed", "", TITLES["detailed"], circuit_network([circuit], nothing, known.pins))
+    networks = {each.end: ports_network([each.ports[state]], nothing) for each in reductions}
     for each in reductions:
-        yield _fixed(name, design, "ports", each.end, each.title, ports_network([each.ports[state]], nothing))
+        yield _fixed(name, design, "ports", each.end, each.title, networks[each.end])
+    if set(TOLERANCES) <= set(networks):
+        yield from _tolerated(name, design, networks)
     if not known.reason:
         network = circuit_network([known.cells[state]], nothing, known.pins)
         yield _fixed(name, design, "cell", "", TITLES["cell"], network)
@@ -101,6 +114,8 @@ def strained_parts(
         yield from strained(name, design, "ports", each.end, each.title, networks[each.end], path.word)
     if set(CORNERS) <= set(networks):
         yield from _monte_carlo(name, design, "ports", [networks[end] for end in CORNERS], path)
+    if set(TOLERANCES) <= set(networks):
+        yield from _tolerated(name, design, networks, path)
     if known.reason:
         return
     try:
@@ -135,6 +150,24 @@ def _monte_carlo(name: str, design: Design, level: str, corners: Sequence[Networ
     yield Part(
         full, level, f"_{SPREAD}", title, middle, (*pins(design, middle), FLAGGED), given, path.word, (low, high)
     )
+
+
+def _tolerated(
+    name: str, design: Design, networks: Mapping[str, Network], path: StrainPath | None = None
+) -> Iterator[Part]:
+    """The ports with a place within the tolerances as a parameter, beside that of a strain where there is a path."""
+    middle, low, high = (networks[end] for end in ("", *TOLERANCES))
+    if not low.names == middle.names == high.names:
+        return  # a tolerance of the whole resistance may open what another state joins
+    title = f"reduction to the pins, {WITHIN} from -1 to 1: all resistivities from the low to the high end of tolerance"
+    given: tuple[tuple[str, str], ...] = ((WITHIN, "0"),)
+    base, own = f"{name}_ports_{WITHIN}", pins(design, middle)
+    if path is None:
+        yield Part(base, "ports", f"_{WITHIN}", title, middle, own, given, "", (low, high))
+        return
+    title, given = f"{title}; strain of the loading as a parameter", ((STRAIN, "0"), *given)
+    full = f"{base}_{path.word}{PARAMETER}"
+    yield Part(full, "ports", f"_{WITHIN}", title, middle, (*own, FLAGGED), given, path.word, (low, high))
 
 
 def strained(

@@ -16,7 +16,17 @@ from circuittex.study.library.bicubic import Patches, patches
 from circuittex.study.library.cell import Cell
 from circuittex.study.library.dialect import DIALECTS, Dialect
 from circuittex.study.library.interpolation import Pieces, pieces
-from circuittex.study.library.network import FLAG, SPREAD, SPREAD_USED, STRAIN, USED, Axis, Network
+from circuittex.study.library.network import (
+    FLAG,
+    SPREAD,
+    SPREAD_USED,
+    STRAIN,
+    USED,
+    WITHIN,
+    WITHIN_USED,
+    Axis,
+    Network,
+)
 from circuittex.study.library.polynomial import cubic, patch_of, piece_of
 from circuittex.study.library.reactive import Reactive, within
 
@@ -41,7 +51,8 @@ def library_text(
 ) -> str:
     """One file: comments with `notes` (key, text) of which no text can become a card, then the sub-circuit.
 
-    `spread`: the networks at the 5th and 95th percentile of resistance, where the place among them is a parameter.
+    `spread`: the networks at the 5th and 95th percentile of resistance, or at the ends of the tolerances, where the
+    place among them is a parameter.
     """
     body = "\n".join(_subcircuit(cell, network, spread, reactive))
     digest = hashlib.sha256(body.encode("ascii")).hexdigest()
@@ -66,7 +77,9 @@ def _subcircuit(
     if reactive is not None:
         network, cards = within(network, reactive)
         lines += cards
-    if len(network.strain) == 1:
+    if spread is not None and WITHIN in dict(cell.parameters):
+        lines += _within_tolerance(network, *spread, dialect)
+    elif len(network.strain) == 1:
         lines += _fixed(network)
     elif spread is not None:
         lines += _by_spread(network, *spread, dialect)
@@ -170,6 +183,30 @@ def _by_spread(network: Network, low: Network, high: Network, dialect: Dialect) 
         share = dialect.choose(f"{SPREAD_USED}<0", f"{middle}-{lower}", f"{upper}-{middle}")
         lines.append(f"R{name} {a} {b} {{exp(-{middle}-{SPREAD_USED}*{share})}}{tc}")
     return [*lines, f"V{FLAG} {FLAG} 0 {{{_outside([STRAIN], network.axes, dialect)}}}"]
+
+
+def _within_tolerance(network: Network, low: Network, high: Network, dialect: Dialect) -> list[str]:
+    """Every resistance goes straight from its value as stated to that at the low (tol = -1) or the high end (tol = 1);
+    where strain is an input too, each of the three follows it as in `_by_parameter`."""
+    lines = [f".param {WITHIN_USED}={{min(max({WITHIN},-1),1)}}"]
+    strained = len(network.strain) > 1
+    if strained:
+        lines.append(f".param {USED}={{{_clamped(STRAIN, *network.axes)}}}")
+    cards = zip(network.names, network.nodes, _coefficients(network), strict=True)
+    for k, (name, (a, b), tc) in enumerate(cards):
+        words = [f"{kind}_{k + 1}" for kind in ("middle", "low", "high")]
+        for word, each in zip(words, (network, low, high), strict=True):
+            ohm = repr(1.0 / float(each.conductance[0, k]))
+            if strained:
+                own = pieces(each.strain, each.conductance[:, [k]])
+                ohm = f"exp(-{_log_conductance(own, 0, USED, dialect)})"
+            lines.append(f".param {word}={{{ohm}}}")
+        middle, lower, upper = words
+        share = dialect.choose(f"{WITHIN_USED}<0", f"{middle}-{lower}", f"{upper}-{middle}")
+        lines.append(f"R{name} {a} {b} {{{middle}+{WITHIN_USED}*{share}}}{tc}")
+    if strained:
+        lines.append(f"V{FLAG} {FLAG} 0 {{{_outside([STRAIN], network.axes, dialect)}}}")
+    return lines
 
 
 def _by_pin(network: Network, dialect: Dialect) -> list[str]:

@@ -77,8 +77,8 @@ def test_silver_plated_nylon_has_its_resistance_in_a_shell_of_a_hundredth_of_the
 
 @pytest.mark.parametrize(("share", "ohm", "least", "density"), [(0.15, 3.79, 64.4, 0.131), (0.10, 3.91, 62.9, 0.120)])
 def test_copper_clad_aluminium_is_as_its_maker_says(share: float, ohm: float, least: float, density: float) -> None:
-    """MWS Wire Industries, copper clad aluminum, for 15 and 10 % of copper by volume: AWG 14 (4109 circular mils) in ohm
-    per 1000 ft, the least conductivity in % of copper's, and lb/in3. Aluminium for conductors has 61 % of copper's
+    """MWS Wire Industries, copper clad aluminum, for 15 and 10 % of copper by volume: AWG 14 (4109 circular mils) in
+    ohm per 1000 ft, the least conductivity in % of copper's, and lb/in3. Aluminium for conductors has 61 % of copper's
     58 S/um."""
     area = 4109 * pi / 4 * 25.4e-3**2  # circular mils to mm2
     published = 304.8 / (ohm * 1e-3 * area)

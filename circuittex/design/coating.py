@@ -8,12 +8,9 @@ which `bending_radius` is for. The limits are exact: a shell of no thickness, or
 from __future__ import annotations
 
 from math import sqrt
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from circuittex.design.yarn import Material
-
-SUMMED = ("youngs_modulus", "density", "electrical_conductivity", "thermal_conductivity", "poisson_ratio")
+SIGMA = "electrical_conductivity"
+SUMMED = ("youngs_modulus", "density", SIGMA, "thermal_conductivity", "poisson_ratio")
 """Fields of a coated fibril that are those of its parts by their shares of the section."""
 
 
@@ -35,8 +32,8 @@ def mixed(core: float, shell: float, share: float) -> float:
     return core + (shell - core) * share
 
 
-def coated(core: Material, shell: Material, share: float) -> dict[str, float]:
-    """The numbers of the homogeneous fibril that is along its axis as a core and a shell of this share are together.
+def coated(core: object, shell: object, share: float) -> dict[str, float]:
+    """The numbers of the material that is along its axis as a core and a shell, two others, of this share are together.
 
     Of E, rho, sigma, k (rule of mixtures: sums of E_i A_i, rho_i A_i, sigma_i A_i, k_i A_i over A) and nu. Its
     resistance follows the temperature as that of the two in parallel does, to second order: with the parts w_i of the
@@ -48,16 +45,15 @@ def coated(core: Material, shell: Material, share: float) -> dict[str, float]:
     >>> [round(coated(nylon, silver, 0.25)[key], 12) for key in ("density", "electrical_conductivity", "tc1")]
     [1.25, 25.0, 0.004]
     """
-    found = {key: mixed(getattr(core, key), getattr(shell, key), share) for key in SUMMED}
-    total = found["electrical_conductivity"]
-    part = shell.electrical_conductivity * share / total if total > 0.0 else share
-    tc1 = mixed(core.tc1, shell.tc1, part)
-    spread = mixed(core.tc1**2, shell.tc1**2, part) - tc1**2
-    return found | {
-        "tc1": tc1,
-        "tc2": mixed(core.tc2, shell.tc2, part) - spread,
-        "tolerance": mixed(core.tolerance, shell.tolerance, part),
-    }
+
+    def mean(key: str, part: float, power: int = 1) -> float:
+        return mixed(getattr(core, key) ** power, getattr(shell, key) ** power, part)
+
+    found = {key: mean(key, share) for key in SUMMED}
+    part = getattr(shell, SIGMA) * share / found[SIGMA] if found[SIGMA] > 0.0 else share
+    tc1 = mean("tc1", part)
+    spread = mean("tc1", part, 2) - tc1**2
+    return found | {"tc1": tc1, "tc2": mean("tc2", part) - spread, "tolerance": mean("tolerance", part)}
 
 
 def bending_radius(radius: float, core_modulus: float, shell_modulus: float, share: float) -> float:

@@ -6,7 +6,8 @@ import re
 import sys
 import tomllib
 from collections.abc import Mapping
-from math import pi
+from dataclasses import replace
+from math import pi, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +20,15 @@ from circuittex.command.cli import main
 from circuittex.command.exit_codes import ExitCode
 from circuittex.design import Design, Yarn, design_hash, load_design, parse_design, starter
 from circuittex.design.files import fabrics
-from circuittex.design.yarn_library import FOLDERS, yarn_library
+from circuittex.design.yarn_library import ENTRY_POINTS, FOLDERS, LONGEST, yarn_library
 from circuittex.results.records import Study
 from circuittex.results.soundness import doubts
 from circuittex.results.summary import agrees
 from circuittex.study.run import run_study
 
 LIBRARY = yarn_library()
+PAGE = (Path(__file__).parents[1] / "docs" / "data_sheet.md").read_text(encoding="utf-8")
+BY_HAND, FILE, PACKAGE = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 ROUNDING = 1e-12
 """Relative, of a few products and roots."""
 OWN = """title = "Mine"
@@ -255,6 +258,40 @@ def test_the_command_lists_them_with_their_sources(folder: Path, capsys: pytest.
     assert "1e+03 ohm/m" in said
 
 
+# The page "From a data sheet to a design"
+
+
+def test_the_yarn_of_the_page_is_that_of_the_library() -> None:
+    by_hand = tomllib.loads(BY_HAND)
+    mapping = with_yarn(by_hand["yarns"]["thread"])
+    mapping["materials"] |= by_hand["materials"]
+    yarn, sold = first(mapping), LIBRARY["silver_nylon_117_17x2"].as_sold()
+    for key in ("rows", "radius", "shell_thickness", "spacing", "row_spacing"):
+        assert getattr(yarn, key) == getattr(sold, key), key
+    for one, other in zip((*yarn.fibrils, *yarn.surfaces), (*sold.fibrils, *sold.surfaces), strict=True):
+        assert same(replace(one, name="any"), replace(other, name="any"))
+    assert yarn.shell is not None
+    assert f"{yarn.shell.electrical_conductivity / 1e3:.1f}e3 S/mm" in PAGE
+    assert f"{34 / 3:.0f} times stiffer" in PAGE, "n filaments of radius R/sqrt(n) bend as R^4/n"
+
+
+def test_the_numbers_of_the_page_s_script() -> None:
+    """T = n pi R^2 rho by hand, and the silver as a ring of that thickness."""
+    thick = 2e3 * sqrt(234e-7 / (34 * pi * 1.14e-3))
+    ring = 1e3 * (277e-7 - 234e-7) / (34 * 10.49e-3 * 2 * pi * (thick / 2e3))
+    assert f"That prints {thick:.1f} um and {ring:.2f} um." in PAGE
+
+
+def test_the_file_of_the_page_is_a_yarn(folder: Path) -> None:
+    (folder / "steel_90.toml").write_text(FILE, encoding="utf-8")
+    yarn = yarn_library(folder)["steel_90"].as_sold()
+    assert ohm_per_metre(yarn) == pytest.approx(60, rel=ROUNDING)
+    assert 2e3 * yarn.radius == pytest.approx(14, abs=0.5), "its title"
+    assert 1e6 / yarn.fibrils[0].electrical_conductivity == pytest.approx(800, rel=0.1), "steel, 740 to 800 nohm m"
+    assert f"up to {LONGEST - 1} letters" in PAGE
+    assert list(tomllib.loads(PACKAGE)["project"]["entry-points"]) == [ENTRY_POINTS]
+
+
 # Fabrics of them
 
 
@@ -283,12 +320,17 @@ def ran(fabric: str, **coarser: int) -> tuple[Design, Study]:
 
 
 def test_silver_sensor_has_the_resistance_of_its_thread() -> None:
-    """269 ohm/m from crossing to crossing, 1 mm; the crossings measured in a plain weave have some 0.3 ohm."""
-    _, study = ran("silver_sensor", elements=16, contact_points=10)
+    """269 ohm/m from crossing to crossing, 1 mm, and Rc as the page says, which goes with 1/sigma_c."""
+    design, study = ran("silver_sensor", elements=16, contact_points=10)
     assert len(study.records) == 2
     for record in study.records:
         assert record.fit.kind_resistance == pytest.approx([0.269], rel=2e-3)  # contacts shunt a little of it
-        assert ((record.fit.crossings > 0.1) & (record.fit.crossings < 1.0)).all()
+    assert f"**{study.records[0].fit.Ry:.3f} ohm**" in PAGE
+    Rc = study.records[0].fit.Rc
+    assert f"says **{Rc:.2f} ohm** at rest" in PAGE
+    assert study.records[1].fit.Rc < Rc
+    other = replace(design, loading=(), contact=replace(design.contact, conductivity=2.5e3))
+    assert f"the run says **{run_study(other).records[0].fit.Rc:.2f} ohm**" in PAGE
 
 
 def test_steel_heater_conducts_along_its_warp_alone() -> None:

@@ -21,12 +21,15 @@ from circuittex.command.cli import main
 from circuittex.command.exit_codes import ExitCode
 from circuittex.contact.extract import contacts_of
 from circuittex.design import Design, Material, Yarn, design_hash, parse_design
+from circuittex.design.restated import restated
 from circuittex.electrical.network.matching import groups
 from circuittex.geometry.permutation import permuted
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.space import beam_space
+from circuittex.results.records import Study
+from circuittex.results.soundness import widest_on_shell
 from circuittex.results.store import load_study
 from circuittex.results.verification import AGREEMENT
 from circuittex.study.library.resistivity import scaled, warmer
@@ -225,6 +228,15 @@ def test_a_shell_of_the_core_s_own_numbers_is_the_core_bit_for_bit() -> None:
     assert same(alike.section_radius, bare.radius)
 
 
+def test_a_coat_has_no_scale_of_its_own() -> None:
+    """Lengths by two and moduli by four, both exact: the mesh is the same in these units, bit for bit."""
+    design = stated({"shell_thickness": "15 um"})
+    one, other = build_mesh(design), build_mesh(restated(design, 2.0, 4.0))
+    assert same(one.bending_radius, 2.0 * other.bending_radius)
+    assert same(one.youngs_modulus, 4.0 * other.youngs_modulus)
+    assert same(one.electrical_conductivity, other.electrical_conductivity)
+
+
 # At the contact, and through all three routes
 
 
@@ -257,6 +269,24 @@ def test_contacts_meet_the_shell(law: str) -> None:
     assert (plated.conductance > 0.0).any()
 
 
+@pytest.mark.parametrize(
+    ("law", "shell", "doubted"), [("holm", 10.0, True), ("crossed", 10.0, False), ("holm", 1.0, False)]
+)
+def test_touches_wider_than_their_shell_is_thick_are_doubted(law: str, shell: float, doubted: bool) -> None:
+    """Where the law spreads current into a half space, and the core does not conduct it as well."""
+    design = stated(
+        {"shell_thickness": "1 um"}, fibril={"electrical_conductivity": 2.0}, shell={"electrical_conductivity": shell}
+    )
+    design = replace(design, contact=replace(design.contact, law=law))
+    mesh = build_mesh(design)
+    start = initial_configuration(mesh)
+    study = Study(version="", design=design, design_hash="", mesh=mesh, initial=start, records=())
+    contacts = contacts_of(design, mesh, start)
+    expected = contacts.width.max() / 1e-3 if doubted else 0.0
+    assert contacts.width.max() > 1e-3
+    assert widest_on_shell(study, contacts) == pytest.approx(expected, rel=ROUNDING)
+
+
 def test_pairs_name_what_touches() -> None:
     mapping = {**tomllib.loads(SMALL)}
     mapping["materials"]["shell"] = mapping["materials"]["fibril"]
@@ -282,6 +312,8 @@ def test_fields_circuit_and_ngspice_agree_on_plated_yarns(tmp_path: Path) -> Non
     (record,) = study.records
     assert record.verification.ngspice_checked
     assert record.verification.agrees
+    report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert all(said in report for said in ("Material metal", "shell thickness", "0.003"))
     assert record.verification.max_current_difference < AGREEMENT
     tube = 250 * pi * (0.15**2 - 0.147**2)
     assert record.currents[0] == pytest.approx(tube / 4.0, rel=1e-3), "contacts add some parts in ten thousand"

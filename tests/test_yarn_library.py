@@ -87,6 +87,8 @@ def test_silver_threads_have_the_resistance_of_their_pages() -> None:
         assert ohm_per_metre(yarn) * 0.3048 == pytest.approx(per_foot, rel=1e-3)  # whole ohms, written as three digits
         assert yarn.shell is not None
         assert 1e3 < yarn.shell.electrical_conductivity < 6.3e4, "no plating beats silver"
+        bulk = yarn.shell
+        assert bulk.thermal_conductivity == pytest.approx(2.44e-8 * 300 * bulk.electrical_conductivity, rel=0.01)
         assert yarn.shell_thickness / yarn.radius == pytest.approx(0.01, rel=0.01)
 
 

@@ -155,8 +155,8 @@ def doubts(study: Study, record: Record) -> tuple[Doubt, ...]:
         Doubt(
             "shell",
             widest_on_shell(study, record.contacts),
-            f"half-widths of touches are up to {widest_on_shell(study, record.contacts):.2g} times the thickness of their "
-            'shell: the laws "holm" and "film" spread current into a half space, and a sheet resists more',
+            f"half-widths of touches are up to {widest_on_shell(study, record.contacts):.2g} times as large as their "
+            'shell is thick: the laws "holm" and "film" spread current into a half space, and a sheet resists more',
         ),
     ]
     return tuple(doubt for doubt in found if doubt.excess >= 1.0)

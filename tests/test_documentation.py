@@ -194,7 +194,7 @@ def test_python(page: str, text: str, folder: Path) -> None:
 
 
 PANELS = [inner for name, inner in shown("toml") if name == "panel.md"]
-# Whole designs are run by test_choosing.py, whole panels below; test_yarn_library.py has the page on data sheets.
+# Whole designs are run by test_choosing.py, whole panels below; test_known_yarns.py has the page on data sheets.
 ELSEWHERE = ("choosing.md", "panel.md", "data_sheet.md")
 PARTS = [(page, text) for page, text in shown("toml") if page not in ELSEWHERE]
 

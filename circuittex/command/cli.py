@@ -75,7 +75,7 @@ def _new(options: argparse.Namespace) -> ExitCode:
 
 
 def _yarns(options: argparse.Namespace) -> ExitCode:
-    from circuittex.design.yarn_library import in_words, yarn_library
+    from circuittex.design.known_yarns import in_words, yarn_library
 
     write_utf8(sys.stdout, "\n".join(in_words(yarn) for yarn in yarn_library(*options.folder).values()))
     return ExitCode.DONE

@@ -14,6 +14,7 @@ from circuittex.design.experiment import (
 )
 from circuittex.design.files import load_design, parse_design, starter
 from circuittex.design.grid import strain_grid
+from circuittex.design.known_yarns import yarn_library
 from circuittex.design.packing import Packing
 from circuittex.design.paper import plain_weave
 from circuittex.design.statement import Design, Electrical, Numerics, design_hash
@@ -27,7 +28,6 @@ from circuittex.design.trade import (
 )
 from circuittex.design.weave import Weave
 from circuittex.design.yarn import Material, Yarn
-from circuittex.design.yarn_library import yarn_library
 
 __all__ = [
     "HERTZ",

@@ -27,13 +27,13 @@ from circuittex.design.experiment import (
     uniaxial,
 )
 from circuittex.design.grid import AXES, strain_grid
+from circuittex.design.known_yarns import with_library
 from circuittex.design.packing import Packing
 from circuittex.design.statement import FORMAT, Design, Electrical, Numerics
 from circuittex.design.table import Table, choose, quantity
 from circuittex.design.touching import AUTO, touching_amplitude
 from circuittex.design.weave import Weave, check_draft
 from circuittex.design.yarn import Yarn
-from circuittex.design.yarn_library import with_library
 from circuittex.design.yarn_table import conductivities, read_material, read_yarn
 
 _T = TypeVar("_T")

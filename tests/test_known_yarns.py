@@ -20,7 +20,7 @@ from circuittex.command.cli import main
 from circuittex.command.exit_codes import ExitCode
 from circuittex.design import Design, Yarn, design_hash, load_design, parse_design, starter
 from circuittex.design.files import fabrics
-from circuittex.design.yarn_library import ENTRY_POINTS, FOLDERS, LONGEST, yarn_library
+from circuittex.design.known_yarns import ENTRY_POINTS, FOLDERS, LONGEST, yarn_library
 from circuittex.results.records import Study
 from circuittex.results.soundness import doubts
 from circuittex.results.summary import agrees

@@ -21,6 +21,8 @@ from circuittex.command.cli import main
 from circuittex.command.exit_codes import ExitCode
 from circuittex.contact.extract import contacts_of
 from circuittex.design import Design, Material, Yarn, design_hash, parse_design
+from circuittex.design.coating import coated
+from circuittex.design.declaration import keys
 from circuittex.design.restated import restated
 from circuittex.electrical.network.matching import groups
 from circuittex.geometry.permutation import permuted
@@ -177,6 +179,16 @@ def test_exported_parts_are_warmed_as_what_they_are_made_of() -> None:
     warm = scaled(design, cold, warmer(50.0))
     assert warm.mesh.electrical_conductivity * 1.2 == pytest.approx(mesh.electrical_conductivity, rel=ROUNDING, abs=0)
     assert warm.conductance * 1.1 == pytest.approx(cold.conductance, rel=ROUNDING, abs=0)
+
+
+def test_every_number_of_a_material_has_one_for_coated_fibrils() -> None:
+    """One that `coated` forgot would have its default there, whatever core and shell say."""
+    assert set(coated(NYLON, SILVER, 0.1)) == set(keys(Material))
+
+
+def test_python_is_told_what_a_shell_is() -> None:
+    with pytest.raises(DesignError, match=r"yarns\.plated\.shell: 'silver' is not usable; it must be a Material"):
+        Yarn("plated", (1,), 1.0, 2.0, 2.0, (NYLON,), "silver", 0.1)  # type: ignore[arg-type]
 
 
 # Bending

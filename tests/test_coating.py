@@ -354,15 +354,15 @@ def test_two_of_the_four_sizes_are_enough() -> None:
     before = 7 * pi * (R - t) ** 2 * 1e-3
     after = before + 7 * pi * (R**2 - (R - t) ** 2) * 1e-2
     sizes = {"radius": R, "shell_thickness": t, "linear_density": after, "core_linear_density": before}
-    for keys in (
+    for given in (
         ("radius", "shell_thickness"),
         ("radius", "core_linear_density"),
         ("linear_density", "shell_thickness"),
         ("linear_density", "core_linear_density"),
         ("core_linear_density", "shell_thickness"),
     ):
-        yarn = stated(bare | {key: sizes[key] for key in keys}, fibril=light, shell=heavy).weave.warp[0]
-        assert (yarn.radius, yarn.shell_thickness) == pytest.approx((R, t), rel=1e-10), keys  # differences of radii
+        yarn = stated(bare | {key: sizes[key] for key in given}, fibril=light, shell=heavy).weave.warp[0]
+        assert (yarn.radius, yarn.shell_thickness) == pytest.approx((R, t), rel=1e-10), given  # differences of radii
 
 
 @pytest.mark.parametrize("unknown", ["fibril", "shell"])

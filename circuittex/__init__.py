@@ -13,7 +13,7 @@ _HOMES = {
         *("ContactLaw", "Design", "Electrical", "Loading", "Material", "MaterialPair", "Numerics", "Packing"),
         *("Probe", "Terminal", "Weave", "Yarn", "biaxial", "design_hash", "equal_steps", "load_design", "load_unload"),
         *("fibril_conductivity", "fibril_radius", "hexagonal_rows", "parse_design", "plain_weave", "shear", "starter"),
-        *("strain_grid", "touching_amplitude", "uniaxial"),
+        *("coated_radius", "shell_thickness", "strain_grid", "touching_amplitude", "uniaxial", "yarn_library"),
     ),
     "geometry.weave": ("build_mesh",),
     "mech.configuration": ("initial_configuration",),
@@ -75,6 +75,7 @@ if TYPE_CHECKING:
     from circuittex.design import Weave as Weave
     from circuittex.design import Yarn as Yarn
     from circuittex.design import biaxial as biaxial
+    from circuittex.design import coated_radius as coated_radius
     from circuittex.design import design_hash as design_hash
     from circuittex.design import equal_steps as equal_steps
     from circuittex.design import fibril_conductivity as fibril_conductivity
@@ -85,10 +86,12 @@ if TYPE_CHECKING:
     from circuittex.design import parse_design as parse_design
     from circuittex.design import plain_weave as plain_weave
     from circuittex.design import shear as shear
+    from circuittex.design import shell_thickness as shell_thickness
     from circuittex.design import starter as starter
     from circuittex.design import strain_grid as strain_grid
     from circuittex.design import touching_amplitude as touching_amplitude
     from circuittex.design import uniaxial as uniaxial
+    from circuittex.design import yarn_library as yarn_library
     from circuittex.electrical.fields import solve_fields as solve_fields
     from circuittex.electrical.network.circuit import Circuit as Circuit
     from circuittex.electrical.network.circuit import build_circuit as build_circuit

@@ -249,7 +249,7 @@ def _through_conductors(design: Design, conductance: Floats) -> Floats:
 
 
 def _conducts(yarn: Yarn) -> bool:
-    return any(material.electrical_conductivity > 0.0 for material in yarn.materials)
+    return any(material.electrical_conductivity > 0.0 for material in yarn.fibrils)
 
 
 def _conducting_pairs(design: Design, grouping: Groups) -> dict[str, tuple[Ints, Ints]]:

@@ -150,7 +150,7 @@ def test_command(command: str, folder: Path, capsys: pytest.CaptureFixture[str])
     if file:
         (folder / file).write_text(out, encoding="utf-8")
         assert load_design(folder / file).name
-        assert out == starter()
+        assert out == starter(words[2] if words[1:2] == ["--fabric"] else "")
     if words[0] == "run":
         assert all(
             (Path(words[3]) / name).exists() for name in ("report.html", "summary.json", "results.h5", "figures")
@@ -194,8 +194,9 @@ def test_python(page: str, text: str, folder: Path) -> None:
 
 
 PANELS = [inner for name, inner in shown("toml") if name == "panel.md"]
-# Whole designs are run by test_choosing.py, whole panels below.
-PARTS = [(page, text) for page, text in shown("toml") if page not in ("choosing.md", "panel.md")]
+# Whole designs are run by test_choosing.py, whole panels below; test_known_yarns.py has the page on data sheets.
+ELSEWHERE = ("choosing.md", "panel.md", "data_sheet.md")
+PARTS = [(page, text) for page, text in shown("toml") if page not in ELSEWHERE]
 
 
 @pytest.mark.parametrize(("page", "text"), PARTS)

@@ -1,4 +1,4 @@
-"""The command line: new, run, netlist, verify, report, ensemble, export, panel."""
+"""The command line: new, yarns, run, netlist, verify, report, ensemble, export, panel."""
 
 from __future__ import annotations
 
@@ -70,7 +70,14 @@ def _exit_code(arguments: Sequence[str] | None) -> ExitCode:
 def _new(options: argparse.Namespace) -> ExitCode:
     from circuittex.design import starter
 
-    write_utf8(sys.stdout, starter())
+    write_utf8(sys.stdout, starter(options.fabric))
+    return ExitCode.DONE
+
+
+def _yarns(options: argparse.Namespace) -> ExitCode:
+    from circuittex.design.known_yarns import in_words, yarn_library
+
+    write_utf8(sys.stdout, "\n".join(in_words(yarn) for yarn in yarn_library(*options.folder).values()))
     return ExitCode.DONE
 
 
@@ -299,6 +306,7 @@ def _panel(options: argparse.Namespace) -> ExitCode:
 
 COMMANDS: dict[str, Callable[[argparse.Namespace], ExitCode]] = {
     "new": _new,
+    "yarns": _yarns,
     "run": _run,
     "netlist": _netlist,
     "verify": _verify,

@@ -34,6 +34,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"circuittex {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_new(commands)
+    _add_yarns(commands)
     _add_run(commands)
     _add_netlist(commands)
     _add_verify(commands)
@@ -63,12 +64,29 @@ def _command(
 
 
 def _add_new(commands: Commands) -> None:
-    _command(
+    parser = _command(
         commands,
         "new",
         "print a commented starter design",
-        "Prints a design file with every setting explained: a plain weave ready to run.",
+        "Prints a design file with every setting explained: a plain weave ready to run. With --fabric it is a small\n"
+        "fabric of yarns that people buy, computed in seconds: silver_sensor, steel_heater or copper_bus.",
         "circuittex new > weave.toml",
+    )
+    parser.add_argument("--fabric", default="", metavar="NAME", help="a fabric of yarns of the library")
+
+
+def _add_yarns(commands: Commands) -> None:
+    parser = _command(
+        commands,
+        "yarns",
+        "list the yarns that a design can name, with their sources",
+        "Lists the yarns of the library, which designs take by 'yarn = \"NAME\"' in a table [yarns.ANY]: what they\n"
+        "are, where their numbers are from, and what is assumed. Those of installed packages and of the folders in\n"
+        "the environment variable CIRCUITTEX_YARNS are among them.",
+        "circuittex yarns",
+    )
+    parser.add_argument(
+        "--folder", type=Path, action="append", default=[], help="a further folder with yarns, as a design names it"
     )
 
 

@@ -39,7 +39,7 @@ class Touches:
     modulus: Floats
     """(P,) E* of the pair, MPa."""
     bulk_a: Floats
-    """(P,) sigma of the fibril of lower number, S/mm."""
+    """(P,) sigma of the surface of the fibril of lower number, S/mm: of its shell where it is coated."""
     bulk_b: Floats
     """(P,) sigma of the other, S/mm."""
     film: Floats

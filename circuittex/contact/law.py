@@ -63,8 +63,9 @@ def largest_penalty(mesh: FibrilMesh, law: ContactLaw) -> Floats:
 
 
 def pair_conductivity(mesh: FibrilMesh, law: ContactLaw, a: Ints, b: Ints) -> Floats:
-    """sigma_c (C,), S/mm2, of contacts between the fibrils a and b (C,); 0 where either of them insulates."""
-    conducts = (mesh.electrical_conductivity[a] > 0) & (mesh.electrical_conductivity[b] > 0)
+    """sigma_c (C,), S/mm2, of contacts between the fibrils a and b (C,); 0 where the surface of either
+    insulates."""
+    conducts = (mesh.surface[a] > 0) & (mesh.surface[b] > 0)
     return np.where(conducts, _of_pairs(mesh, law, "conductivity", a, b), 0.0)
 
 

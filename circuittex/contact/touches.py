@@ -54,8 +54,8 @@ class Points:
 def conductances(mesh: FibrilMesh, law: ContactLaw, points: Points, spacing: Floats) -> tuple[Floats, Floats]:
     """Electrical (C,) S and thermal (C,) W/K conductance of contact points, each by the law of its pair of materials.
 
-    No current passes where either fibril insulates. Heat passes through the same area: h_c a w, h_c 2 a w, or h_c A by
-    all laws that know touches. spacing (F,) mm: of the contact points of a fibril.
+    No current passes where the surface of either fibril insulates. Heat passes through the same area: h_c a w,
+    h_c 2 a w, or h_c A by all laws that know touches. spacing (F,) mm: of the contact points of a fibril.
     """
     names = pair_law(mesh, law, points.a, points.b)
     electrical, thermal = np.zeros(len(names)), np.zeros(len(names))
@@ -69,7 +69,7 @@ def conductances(mesh: FibrilMesh, law: ContactLaw, points: Points, spacing: Flo
             thermal[rows] = per_length(h_c, of.half_width) * of.weight
             continue
         found, touches = _touches(mesh, law, of, spacing)
-        conducts = np.minimum(mesh.electrical_conductivity[of.a], mesh.electrical_conductivity[of.b]) > 0.0
+        conducts = np.minimum(mesh.surface[of.a], mesh.surface[of.b]) > 0.0
         electrical[rows] = np.where(conducts, found.share * of_touches(name, touches)[found.patch], 0.0)
         thermal[rows] = h_c * (found.share * touches.area[found.patch])
     return electrical, thermal
@@ -105,8 +105,8 @@ def _touches(mesh: FibrilMesh, law: ContactLaw, points: Points, spacing: Floats)
         radius_a=R,
         radius_b=other,
         modulus=modulus,
-        bulk_a=mesh.electrical_conductivity[a],
-        bulk_b=mesh.electrical_conductivity[b],
+        bulk_a=mesh.surface[a],
+        bulk_b=mesh.surface[b],
         film=pair_conductivity(mesh, law, a, b),
         **pair_constants(mesh, law, a, b),
     )

@@ -14,11 +14,18 @@ from circuittex.design.experiment import (
 )
 from circuittex.design.files import load_design, parse_design, starter
 from circuittex.design.grid import strain_grid
+from circuittex.design.known_yarns import yarn_library
 from circuittex.design.packing import Packing
 from circuittex.design.paper import plain_weave
 from circuittex.design.statement import Design, Electrical, Numerics, design_hash
 from circuittex.design.touching import touching_amplitude
-from circuittex.design.trade import fibril_conductivity, fibril_radius, hexagonal_rows
+from circuittex.design.trade import (
+    coated_radius,
+    fibril_conductivity,
+    fibril_radius,
+    hexagonal_rows,
+    shell_thickness,
+)
 from circuittex.design.weave import Weave
 from circuittex.design.yarn import Material, Yarn
 
@@ -38,6 +45,7 @@ __all__ = [
     "Weave",
     "Yarn",
     "biaxial",
+    "coated_radius",
     "design_hash",
     "equal_steps",
     "fibril_conductivity",
@@ -48,8 +56,10 @@ __all__ = [
     "parse_design",
     "plain_weave",
     "shear",
+    "shell_thickness",
     "starter",
     "strain_grid",
     "touching_amplitude",
     "uniaxial",
+    "yarn_library",
 ]

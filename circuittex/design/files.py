@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from importlib.resources import files
 from os import PathLike
 from pathlib import Path
 
-from circuittex.base.errors import DesignError
 from circuittex.design.checks import refuse
 from circuittex.design.contact import ContactLaw
 from circuittex.design.declaration import starter_lines
 from circuittex.design.packing import Packing
 from circuittex.design.reader import read_design
 from circuittex.design.statement import Design, Electrical, Numerics
+from circuittex.design.toml_file import read_toml
 from circuittex.design.weave import Weave
 from circuittex.design.yarn import Material, Yarn
 
 DECLARED: tuple[type, ...] = (Material, Yarn, Weave, ContactLaw, Electrical, Numerics, Packing)
 """The parts of a design whose keys are declared beside their fields, in the order of the starter design."""
-_LARGEST_FILE = 10_000_000  # bytes; a draft of a thousand by a thousand yarns takes a third of it
 
 
 def load_design(path: str | PathLike[str]) -> Design:
@@ -28,68 +26,43 @@ def load_design(path: str | PathLike[str]) -> Design:
 
     Raises `DesignError` for a file that cannot be read, is not TOML, or states something impossible.
     """
-    return parse_design(read_toml(path, "design file"))
+    return parse_design(read_toml(path, "design file"), Path(path).parent)
 
 
-def read_toml(path: str | PathLike[str], what: str) -> Mapping[str, object]:
-    """The tables of a TOML file; errors call it `what`.
-
-    Raises `DesignError` for a file that cannot be read or is not TOML.
-    """
-    where = str(path)
-    try:
-        with Path(path).open("rb") as file:
-            data = file.read(_LARGEST_FILE + 1)
-        text = data.decode("utf-8-sig")
-    except FileNotFoundError:
-        raise refuse(what, where, "there is no such file") from None
-    except IsADirectoryError:
-        raise refuse(what, where, "it must be a TOML file, this is a directory") from None
-    except UnicodeDecodeError as error:
-        raise refuse(what, where, f"it must be text in UTF-8; byte {error.start} is not") from None
-    except (OSError, ValueError) as error:
-        raise refuse(what, where, f"it cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if len(data) > _LARGEST_FILE:
-        raise refuse(what, where, f"a {what} has at most {_LARGEST_FILE} bytes")
-    return _toml(text, what)
-
-
-def parse_design(mapping: Mapping[str, object]) -> Design:
-    """The design that a mapping of the layout of `starter` states.
+def parse_design(mapping: Mapping[str, object], folder: str | PathLike[str] = ".") -> Design:
+    """The design that a mapping of the layout of `starter` states; its `yarn_library` is relative to `folder`.
 
     >>> parse_design({"format": 1, "nam": "x"})
     Traceback (most recent call last):
     circuittex.base.errors.DesignError: nam: 'x' is not usable; it is an unknown key, did you mean 'name'?
     """
-    return read_design(mapping)
+    return read_design(mapping, Path(folder))
 
 
-def starter() -> str:
-    """A commented design to start from: the paper's cell with a 10 % stretch, every key explained.
+def fabrics() -> tuple[str, ...]:
+    """Names of the fabrics to start from (`starter`).
 
+    >>> "silver_sensor" in fabrics()
+    True
+    """
+    folder = files("circuittex.design").joinpath("data/fabrics")
+    return tuple(sorted(file.name.removesuffix(".toml") for file in folder.iterdir() if file.name.endswith(".toml")))
+
+
+def starter(fabric: str = "") -> str:
+    """A commented design to start from: the paper's cell with a 10 % stretch, every key explained, or a small fabric of
+    yarns that people buy, by its name.
+
+    >>> import tomllib
     >>> parse_design(tomllib.loads(starter())).weave.yarn_names[0]
     'warp1'
     """
+    if fabric:
+        known = fabrics()
+        if fabric not in known:
+            raise refuse("fabric", fabric, "it must be one of " + ", ".join(map(repr, known)))
+        return files("circuittex.design").joinpath(f"data/fabrics/{fabric}.toml").read_text(encoding="utf-8")
     text = files("circuittex.design").joinpath("data/starter.toml").read_text(encoding="utf-8")
     for kind in DECLARED:
         text = text.replace(f"#@ {kind.__name__}\n", starter_lines(kind) + "\n")
     return text
-
-
-def _toml(text: str, what: str) -> Mapping[str, object]:
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise _syntax_error(text, str(error)) from None
-    except RecursionError:
-        raise refuse(what, "TOML", "it is nested too deeply") from None
-    except ValueError as error:  # a whole number of thousands of digits, for example
-        raise refuse(what, "TOML", f"it cannot be read: {error}") from None
-
-
-def _syntax_error(text: str, message: str) -> DesignError:
-    """The parser's complaint with the line it is about: "... (at line 3, column 7)"."""
-    number = message.partition("(at line ")[2].partition(",")[0]
-    lines = text.splitlines()
-    line = lines[int(number) - 1] if number.isdigit() and int(number) <= len(lines) else (lines or [""])[-1]
-    return refuse(f"TOML, line {number or len(lines)}", line.strip(), f"it is not valid TOML: {message}")

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from math import hypot, inf
+from pathlib import Path
 from typing import TypeVar
 
 from circuittex.design.checks import is_name, name, one_of, real, refuse, truth, whole
@@ -26,6 +27,7 @@ from circuittex.design.experiment import (
     uniaxial,
 )
 from circuittex.design.grid import AXES, strain_grid
+from circuittex.design.known_yarns import with_library
 from circuittex.design.packing import Packing
 from circuittex.design.statement import FORMAT, Design, Electrical, Numerics
 from circuittex.design.table import Table, choose, quantity
@@ -46,14 +48,15 @@ _LOADING_KEYS = {
 }
 
 
-def read_design(mapping: object) -> Design:
-    """The design stated by a mapping of the layout of the starter design."""
+def read_design(mapping: object, folder: Path) -> Design:
+    """The design stated by a mapping of the layout of the starter design; its yarn library is relative to `folder`."""
     top = Table(
         mapping,
         "",
         (
             "format",
             "name",
+            "yarn_library",
             "materials",
             "yarns",
             "weave",
@@ -70,6 +73,7 @@ def read_design(mapping: object) -> Design:
     if isinstance(version, bool) or version != FORMAT:
         raise refuse("format", version, f"this version reads format = {FORMAT}")
     title = top.text("name", "a title for the design")
+    top = with_library(top, folder)
     from_yarns = conductivities(top)
     materials = _named(top, "materials", lambda value, field, label: read_material(value, field, label, from_yarns))
     yarns = _named(top, "yarns", lambda value, field, label: read_yarn(value, field, label, materials))

@@ -11,10 +11,11 @@ Estimated before anything is computed, from the initial wave of a yarn, z = H si
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import ceil, pi, sqrt
 
 from circuittex.base.frozen import frozen
-from circuittex.design.contact import HERTZ, ContactLaw
+from circuittex.design.contact import HERTZ, ContactLaw, ContactProperties
 from circuittex.design.weave import Weave
 from circuittex.design.yarn import Material, Yarn
 
@@ -55,10 +56,11 @@ def resolution(weave: Weave, contact: ContactLaw, order: int, elements: int | No
         for yarn in dict.fromkeys(direction.yarns):
             bend = yarn.radius / (2.0 * sqrt(stretch)) if stretch > 0.0 else direction.step
             step = min(step, max(bend / BENDS, 2.0 * yarn.radius))
-            for material in dict.fromkeys(yarn.materials):
+            for material, surface in _kinds(yarn):
                 for other in dict.fromkeys(weave.yarns):
-                    for partner in dict.fromkeys(other.materials):
-                        length = _contact_length(yarn, material, other, partner, contact, slope)
+                    for partner, touched in _kinds(other):
+                        law = contact.between(surface.name, touched.name)
+                        length = _contact_length(yarn, material, other, partner, law, slope)
                         spacing = min(spacing, length / POINTS)
     longest = max(direction.crossings * direction.step for direction in weave.directions)
     step = step / 2.0 if order == 1 else step
@@ -73,12 +75,17 @@ def _ceil(number: float) -> int:
     return ceil(round(number, 6))
 
 
+def _kinds(yarn: Yarn) -> Iterable[tuple[Material, Material]]:
+    """What the fibrils of a yarn are along their axes, and what they touch with."""
+    return dict.fromkeys(zip(yarn.fibrils, yarn.surfaces, strict=True))
+
+
 def _contact_length(
-    yarn: Yarn, material: Material, other: Yarn, partner: Material, contact: ContactLaw, slope: float
+    yarn: Yarn, material: Material, other: Yarn, partner: Material, law: ContactProperties, slope: float
 ) -> float:
     """2 s (mm) of a fibril that crosses one of another yarn; the length of the contact of two radii at most."""
     radius = (yarn.radius + other.radius) / 2.0
-    penalty = contact.between(material.name, partner.name).penalty
+    penalty = law.penalty
     if penalty == HERTZ:
         soft = sum((1.0 - each.poisson_ratio**2) / each.youngs_modulus for each in (material, partner))
         penalty = 0.5 / soft

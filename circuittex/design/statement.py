@@ -325,11 +325,13 @@ class Design:
                 raise refuse(f"packing.{key}", getattr(self.packing, key), f"it must be at most {most:.4g} {meaning}")
 
     def _check_pairs(self) -> None:
-        known = dict.fromkeys(material.name for yarn in self.weave.yarns for material in yarn.materials)
+        known = dict.fromkeys(material.name for yarn in self.weave.yarns for material in yarn.surfaces)
         for pair in self.contact.pairs:
             for material in pair.materials:
                 if material not in known:
-                    allowed = "it must be a material of the weave's yarns: " + ", ".join(map(repr, known))
+                    allowed = "it must be a material that fibrils of the weave touch with: " + ", ".join(
+                        map(repr, known)
+                    )
                     raise refuse("contact.pairs.materials", material, allowed)
 
     def _check_terminals(self) -> None:

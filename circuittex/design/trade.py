@@ -28,6 +28,38 @@ def fibril_radius(linear_density: float, filaments: int, density: float) -> floa
     return sqrt(area / pi)
 
 
+def coated_radius(linear_density: float, filaments: int, core: float, shell: float, thickness: float) -> float:
+    """R (mm) of the filaments of a yarn that weighs T (g/mm) with its shell of thickness t (mm); densities in g/mm3.
+
+    T = n pi (rho_c (R - t)² + rho_s (R² - (R - t)²)), the positive root of rho_c R² + 2 t (rho_s - rho_c) R = ...
+
+    >>> bare = fibril_radius(235e-7, 34, 1.14e-3)
+    >>> coated_radius(235e-7, 34, 1.14e-3, 10.5e-3, 0.0) == bare
+    True
+    """
+    if thickness == 0.0:
+        return fibril_radius(linear_density, filaments, core)
+    area = real(linear_density, "linear_density", "g/mm", above=0) / (whole(filaments, "filaments", 1, 10**6) * pi)
+    lean = thickness * (shell - core)
+    return (sqrt(lean**2 + core * (area + thickness * lean)) - lean) / real(core, "density", "g/mm3", above=0)
+
+
+def shell_thickness(
+    linear_density: float, core_linear_density: float, filaments: int, core: float, shell: float
+) -> float:
+    """t (mm) of the shell that makes a yarn of filaments of T_c (g/mm) one of T; densities in g/mm3.
+
+    T - T_c = n pi rho_s (R² - R_c²). What silver plating adds to nylon:
+
+    >>> round(1e3 * shell_thickness(290e-7, 235e-7, 34, 1.14e-3, 10.5e-3), 3)  # um
+    0.175
+    """
+    inner = fibril_radius(core_linear_density, filaments, core)
+    added = real(linear_density - core_linear_density, "linear_density", "g/mm more than its core", at_least=0)
+    square = added / (filaments * pi * real(shell, "density", "g/mm3", above=0))
+    return square / (sqrt(inner**2 + square) + inner)
+
+
 def fibril_conductivity(resistance: float, area: float) -> float:
     """sigma (S/mm) of fibrils of joint section A (mm2) that have a resistance r' (ohm/mm) side by side: 1 / (r' A).
 

@@ -88,7 +88,7 @@ class Weave:
 
     def _check_names(self) -> None:
         # Resistances are fitted and listed by name: two kinds under one would share what neither has.
-        materials = (material for yarn in self.yarns for material in yarn.materials)
+        materials = (material for yarn in self.yarns for material in (*yarn.materials, *yarn.surfaces))
         named: tuple[tuple[str, Iterable[Yarn | Material]], ...] = (("yarns", self.yarns), ("materials", materials))
         for kind, things in named:
             known: dict[str, Yarn | Material] = {}

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import field
 
 from circuittex.base.frozen import frozen
-from circuittex.design.checks import instances, name, refuse, sequence, store, whole
+from circuittex.design.checks import instance, instances, name, refuse, sequence, store, whole
+from circuittex.design.coating import bending_radius, coated, shell_share
 from circuittex.design.declaration import Key, check, number
 
 MOST_FIBRILS = 10_000
@@ -102,7 +103,8 @@ class Material:
 class Yarn:
     """A kind of yarn: parallel fibrils packed in rows, the bottom row first.
 
-    Fibrils are numbered row by row, within a row towards growing y (warp) or x (weft).
+    Fibrils are numbered row by row, within a row towards growing y (warp) or x (weft). Each is of one material, or a
+    core of it in a shell.
 
     >>> silver = Material("silver", 10.0, 0.0, 1.0, 10.0, 1.0)
     >>> Yarn("conductive", (3, 4, 3), 0.15, 0.3, 0.3, (silver,) * 10).n_fibrils
@@ -124,7 +126,14 @@ class Yarn:
     )
     """Vertical distance of neighbouring rows, mm."""
     materials: tuple[Material, ...]
-    """One for each fibril."""
+    """One for each fibril; of its core, where the fibrils are coated."""
+    shell: Material | None = None
+    """What every fibril is coated with."""
+    shell_thickness: float = field(
+        default=0.0,
+        metadata=number("mm", "of the shell on every fibril, within its radius; 0: none", shown="0 mm", at_least=0),
+    )
+    """Of the shell on every fibril, mm, within the radius."""
     crimp: float | str = field(
         default=0.0,
         kw_only=True,
@@ -162,10 +171,53 @@ class Yarn:
             )
         store(self, rows=rows, materials=materials)
         check(self, at)
+        self._check_shell(at)
+
+    def _check_shell(self, at: str) -> None:
+        if self.shell is not None:
+            instance(self.shell, f"{at}.shell", Material)
+        elif self.shell_thickness > 0.0:
+            raise refuse(f"{at}.shell_thickness", self.shell_thickness, "it needs a shell, the name of a material")
+        if self.shell_thickness >= self.radius:
+            allowed = f"it must be less than the radius of {self.radius:.4g} mm, of which it is a part"
+            raise refuse(f"{at}.shell_thickness", self.shell_thickness, allowed)
 
     @property
     def n_fibrils(self) -> int:
         return sum(self.rows)
+
+    @property
+    def coated(self) -> bool:
+        """Whether its fibrils have a shell."""
+        return self.shell is not None and self.shell_thickness > 0.0
+
+    @property
+    def fibrils(self) -> tuple[Material, ...]:
+        """What each fibril is along its axis: its material, or one with the sums of core and shell (`coated`).
+
+        >>> nylon = Material("nylon", 2e3, 0.4, 1.0, 0.0, 1.0)
+        >>> silver = Material("silver", 2e3, 0.4, 2.0, 100.0, 1.0)
+        >>> Yarn("plated", (1,), 1.0, 2.0, 2.0, (nylon,), silver, 0.5).fibrils[0].electrical_conductivity
+        75.0
+        """
+        if self.shell is None or not self.coated:
+            return self.materials
+        shell, share = self.shell, shell_share(self.radius, self.shell_thickness)
+        alike = {core: Material(core.name, **coated(core, shell, share)) for core in dict.fromkeys(self.materials)}
+        return tuple(alike[core] for core in self.materials)
+
+    @property
+    def surfaces(self) -> tuple[Material, ...]:
+        """What each fibril touches others with: its shell, or its material where it has none."""
+        return self.materials if self.shell is None or not self.coated else (self.shell,) * self.n_fibrils
+
+    @property
+    def bending_radii(self) -> tuple[float, ...]:
+        """Radius of the homogeneous section that bends as each fibril does (`bending_radius`), mm."""
+        if self.shell is None or not self.coated:
+            return (self.radius,) * self.n_fibrils
+        modulus, share = self.shell.youngs_modulus, shell_share(self.radius, self.shell_thickness)
+        return tuple(bending_radius(self.radius, core.youngs_modulus, modulus, share) for core in self.materials)
 
 
 def check_rows(rows: object, field: str) -> tuple[int, ...]:

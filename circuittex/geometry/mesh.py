@@ -52,11 +52,15 @@ class FibrilMesh:
     yarn_axis: Ints
     """(Y,) 0 for a yarn along x, 1 along y."""
     material: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    """(F,) place of each fibril's material in `material_names`; empty where no contact law asks for it."""
+    """(F,) place of what each fibril touches with in `material_names`; empty where no contact law asks for it."""
     material_names: tuple[str, ...] = ()
-    """Names of the materials, in the order of their first fibrils."""
+    """Names of the materials that touch, shells where there are any, in the order of their first fibrils."""
     natural: Floats = field(default_factory=lambda: np.empty((0, 3, 3)))
     """(N, 3, 3) r, mm, g1 and g2 of the stress-free shapes; empty where every fibril is naturally straight."""
+    surface_conductivity: Floats = field(default_factory=lambda: np.empty(0))
+    """(F,) sigma of what a fibril touches others with, S/mm; empty where no fibril is coated."""
+    bending_radius: Floats = field(default_factory=lambda: np.empty(0))
+    """(F,) radius of the homogeneous section of E that bends as the fibril does, mm; empty where none is coated."""
 
     @property
     def order(self) -> int:
@@ -85,6 +89,16 @@ class FibrilMesh:
     def area(self) -> Floats:
         """(F,) section area pi R^2, mm2."""
         return np.pi * self.radius**2
+
+    @property
+    def surface(self) -> Floats:
+        """(F,) sigma of what a fibril touches others with, S/mm: of its shell, or its own."""
+        return self.surface_conductivity if len(self.surface_conductivity) else self.electrical_conductivity
+
+    @property
+    def section_radius(self) -> Floats:
+        """(F,) radius that counts in bending, mm: R, or that of a homogeneous section like the coated one."""
+        return self.bending_radius if len(self.bending_radius) else self.radius
 
     def end_nodes(self, side: int) -> Ints:
         """(F,) node at xi3 = 0 (`side` -1, the minus end) or at xi3 = L (`side` +1, the plus end)."""

@@ -6,7 +6,8 @@ from dataclasses import fields
 
 import numpy as np
 
-from circuittex.design import Design, Material
+from circuittex.base.arrays import Floats
+from circuittex.design import Design, Material, Weave
 from circuittex.design.declaration import keys
 from circuittex.geometry.centre_lines import centre_lines
 from circuittex.geometry.mesh import FibrilMesh
@@ -36,8 +37,9 @@ def build_mesh(design: Design) -> FibrilMesh:
     n_fibrils = len(lines.yarn)
     first_node = np.arange(n_fibrils + 1) * n_nodes
     within = np.arange(elements)[:, None] * numerics.order + np.arange(numerics.order + 1)
-    materials = [material for kind in weave.yarns for material in kind.materials]
-    names = list(dict.fromkeys(material.name for material in materials))
+    materials = [material for kind in weave.yarns for material in kind.fibrils]
+    surfaces = [material for kind in weave.yarns for material in kind.surfaces]
+    names = list(dict.fromkeys(material.name for material in surfaces))
     return FibrilMesh(
         position=lines.position.reshape(-1, 3),
         directors=lines.directors.reshape(-1, 2, 3),
@@ -51,10 +53,19 @@ def build_mesh(design: Design) -> FibrilMesh:
         **{name: np.array([getattr(material, name) for material in materials]) for name in material_fields()},
         yarn_names=weave.yarn_names,
         yarn_axis=np.repeat([0, 1], [len(weave.warp), len(weave.weft)]),
-        material=np.array([names.index(material.name) for material in materials]),
+        material=np.array([names.index(material.name) for material in surfaces]),
         material_names=tuple(names),
         natural=lines.natural.reshape(-1, 3, 3),
+        **(_coats(weave, surfaces) if any(kind.coated for kind in weave.yarns) else {}),
     )
+
+
+def _coats(weave: Weave, surfaces: list[Material]) -> dict[str, Floats]:
+    """What the mesh holds of fibrils some of which are coated."""
+    return {
+        "surface_conductivity": np.array([material.electrical_conductivity for material in surfaces]),
+        "bending_radius": np.array([radius for kind in weave.yarns for radius in kind.bending_radii]),
+    }
 
 
 def material_fields() -> list[str]:

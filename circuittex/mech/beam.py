@@ -37,7 +37,7 @@ class Beam:
         if np.any(lam > lam_b):  # one more point, on the axis, for the rest of lambda
             unit, share = np.vstack([unit, [0.0, 0.0]]), np.append(share, 1.0)
         on_axis = np.arange(len(unit)) >= len(disk_rule(degree)[1])
-        points = np.swapaxes(unit * mesh.radius[fibril, None, None], 1, 2).copy()
+        points = np.swapaxes(unit * mesh.section_radius[fibril, None, None], 1, 2).copy()
         area = share * mesh.area[fibril, None, None] * np.ones_like(space.weight)[..., None]
         strains, metric = _straight(space)
         if natural is not None:

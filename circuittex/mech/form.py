@@ -39,7 +39,7 @@ def section_points(mesh: FibrilMesh, degree: int) -> list[SectionPoint]:
     fibril = mesh.element_fibril
     mu, lam = lame(mesh.youngs_modulus, mesh.poisson_ratio)
     lam_b = bending_lambda(mu, mesh.poisson_ratio)
-    R, A, mu, lam, lam_b = (x[fibril][:, None] for x in (mesh.radius, mesh.area, mu, lam, lam_b))
+    R, A, mu, lam, lam_b = (x[fibril][:, None] for x in (mesh.section_radius, mesh.area, mu, lam, lam_b))
     points = [
         SectionPoint(xi1=R * x, xi2=R * y, area=A * share, mu=mu, lam=lam_b)
         for (x, y), share in zip(*disk_rule(degree), strict=True)

@@ -87,7 +87,7 @@ def fibril_scales(space: BeamSpace, span: float, penalty: float | Floats = 0.0) 
     mesh = space.mesh
     stretching = mesh.youngs_modulus * mesh.area
     stiffer = np.maximum(mesh.youngs_modulus, 2 * np.asarray(penalty)) * mesh.area
-    bending = BENDING * stiffer * mesh.radius**2 / 4
+    bending = BENDING * stiffer * mesh.section_radius**2 / 4
 
     area = span * span  # and not span**4, which a power function may round otherwise at another scale
 

@@ -15,6 +15,8 @@ HOT = 300.0
 SEEN = 1.4
 """Contact points across a contact: with fewer they see its middle or miss it by chance. Rc was 8 % off with 1.7 of
 them, 55 % with 0.3 (copper of 25 um)."""
+SPREADING = ("holm", "film")
+"""Laws of conductance in which current spreads into a half space."""
 STRONGEST = 1e4
 """MPa: no fibre, of carbon or any other matter, carries more."""
 SOLID, ELASTOMER = 0.2, 100.0
@@ -88,12 +90,29 @@ def points_across(contacts: ContactState) -> float:
     return float(np.quantile(4 * np.sqrt(radius * overlap) / (2 * contacts.weight[between]), 0.9))
 
 
+def widest_on_shell(study: Study, contacts: ContactState) -> float:
+    """Largest half-width of a touch over the thickness of the shell that it meets; 0 where there is none.
+
+    Of touches whose law has current spread into a half space, on shells that conduct better than their cores.
+    """
+    design, mesh = study.design, contacts.mesh
+    yarns = design.weave.yarns
+    if not any(yarn.coated for yarn in yarns):
+        return 0.0
+    thickness = np.array([yarn.shell_thickness if yarn.coated else np.inf for yarn in yarns])[mesh.yarn]
+    thickness = np.where(mesh.electrical_conductivity < mesh.surface, thickness, np.inf)
+    names, a, b = mesh.material_names, contacts.fibril_a, contacts.fibril_b
+    spreads = np.array([[design.contact.between(one, other).law in SPREADING for other in names] for one in names])
+    rows = (contacts.conductance > 0.0) & spreads[mesh.material[a], mesh.material[b]]
+    return float((contacts.width / np.minimum(thickness[a], thickness[b]))[rows].max(initial=0.0))
+
+
 @frozen
 class Doubt:
     """One reason to doubt a state."""
 
     kind: str
-    """'overlap', 'stress', 'temperature' or 'mesh'."""
+    """'overlap', 'stress', 'temperature', 'mesh' or 'shell'."""
     excess: float
     """How far it is beyond what gives no reason, as a ratio of at least 1."""
     text: str
@@ -132,6 +151,12 @@ def doubts(study: Study, record: Record) -> tuple[Doubt, ...]:
             SEEN / points_across(record.contacts),
             f"the mesh is too coarse for its fibrils: contacts of yarns are {points_across(record.contacts):.2g} "
             'contact points wide, so that Rc may be far off; elements and contact_points = "auto" follow the fibrils',
+        ),
+        Doubt(
+            "shell",
+            widest_on_shell(study, record.contacts),
+            f"half-widths of touches are up to {widest_on_shell(study, record.contacts):.2g} times as large as their "
+            'shell is thick: the laws "holm" and "film" spread current into a half space, and a sheet resists more',
         ),
     ]
     return tuple(doubt for doubt in found if doubt.excess >= 1.0)

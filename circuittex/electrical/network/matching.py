@@ -80,7 +80,7 @@ def groups(design: Design, *, each_crossing: bool) -> Groups:
     names, segments = [], []
     for direction in (warp, weft):
         for yarn in direction.yarns:
-            sigma = sum(each.electrical_conductivity for each in yarn.materials)
+            sigma = sum(each.electrical_conductivity for each in yarn.fibrils)
             siemens = sigma * np.pi * yarn.radius**2 / direction.step
             names.append(f"{yarn.name} {direction.name}" if apart else yarn.name)
             segments.append(1.0 / siemens if siemens > 0.0 and direction.crossings else np.inf)

@@ -82,7 +82,7 @@ def yarn_conductance(design: Design) -> float:
     0.8836
     """
     return max(
-        sum(material.electrical_conductivity for material in yarn.materials)
+        sum(material.electrical_conductivity for material in yarn.fibrils)
         * np.pi
         * yarn.radius
         * yarn.radius

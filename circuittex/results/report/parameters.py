@@ -18,15 +18,19 @@ from circuittex.results.report.template import render
 def parameters(design: Design) -> Markup:
     """The tables of all settings as HTML; the packing where it is not the regular one."""
     yarns = dict.fromkeys(design.weave.warp + design.weave.weft)
-    materials = dict.fromkeys(material for yarn in yarns for material in yarn.materials)
+    materials = dict.fromkeys(material for yarn in yarns for material in (*yarn.materials, *yarn.surfaces))
     tables = [
         _weave(design.weave),
         *(
             _settings(
                 f"Yarn {yarn.name}",
                 yarn,
-                {"materials": runs(m.name for m in yarn.materials), "rows": ", ".join(map(str, yarn.rows))},
-                skip=("name",),
+                {
+                    "materials": runs(m.name for m in yarn.materials),
+                    "rows": ", ".join(map(str, yarn.rows)),
+                    "shell": yarn.shell.name if yarn.shell else "",
+                },
+                skip=("name",) if yarn.coated else ("name", "shell", "shell_thickness"),
             )
             for yarn in yarns
         ),

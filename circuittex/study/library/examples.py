@@ -40,10 +40,9 @@ def _parameter(
     cell: Cell, ends: tuple[str, str], ranges: Sequence[tuple[float, float]], floating: Sequence[str]
 ) -> str:
     flagged = any(pin.kind == "flag" for pin in cell.pins)
-    where = "at the lowest strain, amid the range, and beyond it, where the flag is up"
-    what = (
-        f"{OHMMETER.format(*ends)}; {where if flagged else 'at the low end, amid, and beyond the high end, as at it'}"
-    )
+    strained = "at the lowest strain, amid the range, and beyond it, where the flag is up"
+    where = strained if flagged else "at the low end, as stated, and beyond the high end, as at it"
+    what = f"{OHMMETER.format(*ends)}; {where}"
     lines = []
     places = [(low, (low + high) / 2, 2 * high - low) for low, high in ranges]
     for number, strains in enumerate(zip(*places, strict=True), 1):

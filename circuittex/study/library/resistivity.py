@@ -49,12 +49,12 @@ def scaled(design: Design, contacts: ContactState, factor: Factor) -> ContactSta
     """The contacts with the resistivity of each fibril and each contact times its factor."""
     if factor is as_stated:
         return contacts
-    materials = _materials(design)
+    surfaces = [each for yarn in design.weave.yarns for each in yarn.surfaces]
     mesh = contacts.mesh
-    along = np.array([factor(each) for each in materials])
+    along = np.array([factor(each) for each in _materials(design)])
     across = np.array(
         [
-            factor(_between(design.contact, materials[a], materials[b]))
+            factor(_between(design.contact, surfaces[a], surfaces[b]))
             for a, b in zip(contacts.fibril_a.tolist(), contacts.fibril_b.tolist(), strict=True)
         ]
     )
@@ -70,5 +70,5 @@ def _between(law: ContactLaw, one: Material, other: Material) -> ContactProperti
 
 
 def _materials(design: Design) -> list[Material]:
-    """(F,) of the fibrils in the order of the mesh."""
-    return [each for yarn in (*design.weave.warp, *design.weave.weft) for each in yarn.materials]
+    """(F,) what the fibrils are along their axes, in the order of the mesh."""
+    return [each for yarn in design.weave.yarns for each in yarn.fibrils]

@@ -11,8 +11,8 @@ import numpy as np
 
 from circuittex.base.arrays import Floats
 from circuittex.design.checks import refuse
-from circuittex.design.files import read_toml
 from circuittex.design.table import Table, quantity
+from circuittex.design.toml_file import read_toml
 from circuittex.results.store import load_study
 from circuittex.study.panel.cells import KINDS, CellResistances, cells_of_study
 from circuittex.study.panel.maps import read_map

@@ -101,6 +101,7 @@ REFUSED = [
     ("warp = 6", "warp = 0", ["panel.warp: 0", "from 1"]),
     ("warp = 6\nweft = 8", "warp = 30000\nweft = 40000", ["panel", "30000 x 40000 cells", str(MOST_CELLS)]),
     ("warp = 6", "warp = 6.5", ["panel.warp: 6.5", "whole number"]),
+    ("warp = 6", "warp = 1000000000", ["panel.warp: 1000000000", f"from 1 to {MOST_CELLS}"]),
     ('pitch = "2 mm"', 'pitch = "-2 mm"', ["panel.pitch: -2.0", "> 0 mm"]),
     ('pitch = "2 mm"', "", ["panel.pitch", "the key is missing"]),
     ('"weft8"', '"weft9"', ["panel.insulating[0]: 'weft9'", "weft1 to weft8"]),
@@ -184,7 +185,7 @@ def test_resistances_too_far_apart_are_refused_or_right() -> None:
     "text",
     [
         *["().__class__", "x.y", "lambda: 1", "[1]", "x if y else 1", "9**9**9**9 * x", "'a' * 9", "x and y"],
-        *["exp(x, y)", "(" * 300 + "x", "x" + "+x" * 249, "\0", "", "x := 1", "1e999", "True", "f(x)", "exp(x=1)"],
+        *["exp(x, y)", "(" * 300 + "x", "-" * 300 + "x", "\0", "", "x := 1", "1e999", "True", "f(x)", "exp(x=1)"],
         "x" * 501,
     ],
 )
@@ -382,3 +383,32 @@ def test_without_multigrid_a_large_panel_is_refused(monkeypatch: pytest.MonkeyPa
 def test_python_is_refused_in_the_same_words() -> None:
     with pytest.raises(CircuittexError, match=r"electrodes: 'nothing' .* at least one electrode"):
         Panel((2, 2), CellResistances(1.0, 1.0, 1.0), ())
+
+
+# Anything anywhere
+
+NONSENSE = [True, False, [], {}, "", "x", "5 V", "nan ohm", float("nan"), float("inf"), -1, 0, 1e300, 10**30, [1]]
+NONSENSE += [[[1, 2]], [[1, 2], [3, 4]], {"x": 1}, ["a"], [None], "warp1-", "../x.npy", "\n.include x", [1, 2, 3, 4]]
+
+
+def leaves(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Where values, tables and lists of a panel file are."""
+    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    return [path, *(leaf for key, each in inner for leaf in leaves(each, (*path, key)))]
+
+
+@pytest.mark.parametrize("path", leaves(tomllib.loads(SMALL))[1:], ids=lambda path: ".".join(map(str, path)))
+def test_nonsense_in_any_place_is_refused_in_one_sentence(path: tuple[Any, ...]) -> None:
+    """Or used, where it happens to mean something."""
+    for value in NONSENSE:
+        mapping = tomllib.loads(SMALL)
+        table = mapping
+        for key in path[:-1]:
+            table = table[key]
+        table[path[-1]] = value
+        said = ""
+        try:
+            solve_panel(parse_panel(mapping, Path("nowhere"))[0])
+        except CircuittexError as error:
+            said = str(error)
+        assert "\n" not in said

@@ -6,8 +6,9 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
+from circuittex.base.expression import DEEPEST, Expression
 from circuittex.electrical.spice.cards import Card
-from circuittex.electrical.spice.expression import DEEPEST, RESERVED, Expression, compile_expression, read_number
+from circuittex.electrical.spice.expression import RESERVED, compile_expression, read_number
 
 ALLOWED = (
     "allowed are R, V and X cards, .subckt, .ends, .param, .include, .lib and .end; "

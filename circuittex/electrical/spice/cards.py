@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from circuittex.base.errors import CircuitError
-from circuittex.electrical.spice.expression import DEEPEST
+from circuittex.base.expression import DEEPEST
 
 MOST_FILES = 1000
 """Files that a deck may include, one that is included again counted again."""

@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from circuittex.base.errors import CircuitError
+from circuittex.base.expression import DEEPEST, Expression
 from circuittex.base.frozen import frozen
 from circuittex.electrical.network.circuit import REDUCED, Circuit
 from circuittex.electrical.spice.blocks import GROUND, Block, Call, Resistor, Source, read_blocks
 from circuittex.electrical.spice.cards import Card, read_cards
-from circuittex.electrical.spice.expression import DEEPEST, Expression, evaluate
+from circuittex.electrical.spice.expression import evaluate
 
 LARGEST = 2_000_000
 """Resistors, sources and calls of an expanded deck at most."""

@@ -2,37 +2,29 @@
 
 from __future__ import annotations
 
-import ast
 import operator
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
+from circuittex.base import expression
 from circuittex.base.arrays import Floats
+from circuittex.base.expression import Language
 from circuittex.design.checks import refuse
 
 LONGEST = 500
 """Characters of a formula at most."""
-_DEEPEST = 100
 
-_BINARY: dict[type, Callable[[Any, Any], Any]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
+_FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
+    **{name: (1, getattr(np, name)) for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "abs", "tanh", "floor")},
+    **{"min": (2, np.minimum), "max": (2, np.maximum), "hypot": (2, np.hypot), "where": (3, np.where)},
 }
-_UNARY: dict[type, Callable[[Any], Any]] = {ast.UAdd: operator.pos, ast.USub: operator.neg}
-_COMPARISONS: dict[type, Callable[[Any, Any], Any]] = {
-    ast.Lt: operator.lt,
-    ast.LtE: operator.le,
-    ast.Gt: operator.gt,
-    ast.GtE: operator.ge,
-}
-_FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
-    **{name: (getattr(np, name), 1) for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "abs", "tanh", "floor")},
-    **{"min": (np.minimum, 2), "max": (np.maximum, 2), "hypot": (np.hypot, 2), "where": (np.where, 3)},
+_COMPARISONS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
+_CALLS: dict[str, Callable[..., Any]] = {
+    **{"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "^": operator.pow},
+    "negative": operator.neg,
+    **{name: function for name, (_, function) in _FUNCTIONS.items()},
 }
 ALLOWED = "numbers, + - * / ^ ( ), comparisons, pi, and " + ", ".join(_FUNCTIONS)
 """What a formula may consist of, in words."""
@@ -51,12 +43,14 @@ def evaluate(text: str, variables: Mapping[str, Floats], field: str) -> Floats:
     """
     if len(text) > LONGEST:
         raise refuse(field, text, f"a formula has at most {LONGEST} characters")
+    known = {"pi": np.float64(np.pi), **variables}
     try:
-        tree = ast.parse(text.strip().replace("^", "**"), mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise refuse(field, text, f"it must be a formula of {', '.join(variables)}: {ALLOWED}") from None
-    with np.errstate(all="ignore"):
-        found = _value(tree, variables, text, field, 0)
+        steps = expression.compile_expression(text, _PANEL)
+        with np.errstate(all="ignore"):
+            found = expression.evaluate(steps, known.__getitem__, _call)
+    except (ValueError, KeyError) as error:
+        reason = f"{error.args[0]!r} is unknown" if isinstance(error, KeyError) else str(error)
+        raise refuse(field, text, f"it may consist of {', '.join(variables)}, {ALLOWED}: {reason}") from None
     shape = np.broadcast_shapes(*(np.shape(each) for each in variables.values()))
     values = np.broadcast_to(np.asarray(found, dtype=np.float64), shape)
     if not np.isfinite(values).all():
@@ -64,37 +58,17 @@ def evaluate(text: str, variables: Mapping[str, Floats], field: str) -> Floats:
     return np.array(values)
 
 
-def _value(node: ast.AST, variables: Mapping[str, Floats], text: str, field: str, depth: int) -> Any:
-    """The value of one node of the syntax tree; whatever is not listed is refused."""
+def _call(name: str, values: list[Any]) -> Any:
+    if name in _COMPARISONS:
+        return np.where(_COMPARISONS[name](*values), 1.0, 0.0)
+    return _CALLS[name](*values)
 
-    def of(inner: ast.AST) -> Any:
-        return _value(inner, variables, text, field, depth + 1)
 
-    if depth > _DEEPEST:
-        raise refuse(field, text, "the formula is nested too deeply")
-    match node:
-        case ast.Constant(value=bool()):
-            pass
-        case ast.Constant(value=int() | float() as number):
-            try:
-                return np.float64(number)  # a float: powers of whole numbers could grow without end
-            except OverflowError:
-                raise refuse(field, text, "a number in it is too large") from None
-        case ast.Name(id=name) if name in variables:
-            return variables[name]
-        case ast.Name(id="pi"):
-            return np.pi
-        case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
-            return _BINARY[type(op)](of(left), of(right))
-        case ast.UnaryOp(op=op, operand=operand) if type(op) in _UNARY:
-            return _UNARY[type(op)](of(operand))
-        case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in _COMPARISONS:
-            return np.where(_COMPARISONS[type(op)](of(left), of(right)), 1.0, 0.0)
-        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in _FUNCTIONS:
-            function, count = _FUNCTIONS[name]
-            if len(arguments) != count:
-                raise refuse(field, text, f"{name} takes {count} argument{'s' * (count > 1)}")
-            return function(*map(of, arguments))
-        case _:
-            pass
-    raise refuse(field, text, f"it may consist of {', '.join(variables)}, {ALLOWED}")
+def _number(token: str) -> np.float64:
+    value = np.float64(token)  # powers of Python's whole numbers could grow without end
+    if not np.isfinite(value):
+        raise ValueError(f"{token!r} is too large")
+    return value
+
+
+_PANEL = Language({name: count for name, (count, _) in _FUNCTIONS.items()}, _number, LONGEST, comparisons=True)

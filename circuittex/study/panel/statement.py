@@ -227,8 +227,8 @@ def check_shape(shape: Any) -> tuple[int, int]:
     """
     if isinstance(shape, str) or not hasattr(shape, "__len__") or len(shape) != 2:
         raise refuse("panel", shape, "its shape must be two whole numbers, of warp and weft yarns")
-    n = whole(shape[0], "panel.warp", 1, 10**9)
-    m = whole(shape[1], "panel.weft", 1, 10**9)
+    n = whole(shape[0], "panel.warp", 1, MOST_CELLS)
+    m = whole(shape[1], "panel.weft", 1, MOST_CELLS)
     if n * m > MOST_CELLS:
         raise refuse("panel", f"{n} x {m} cells", f"a panel has at most {MOST_CELLS} cells")
     return n, m

@@ -29,8 +29,8 @@ _ROUNDS = 6
 """Corrections at most; one is usual."""
 _FEW, _SMALL = 2, 100_000
 """Up to this many columns multigrid is faster from this many unknowns on (benchmarks/panel.py)."""
-LARGEST_DIRECT = 1_200_000
-"""Unknowns of a factorisation at most: it takes 2 GB and some ten seconds."""
+LARGEST_DIRECT = 3_000_000
+"""Unknowns of a factorisation at most: with 64 columns it takes some 6 GB and 80 s, where multigrid takes ten minutes."""
 _BLOCK = 8
 """Columns that are solved at once, for memory's sake."""
 _COARSE = 2000

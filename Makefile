@@ -4,7 +4,7 @@
 VENV ?= .venv
 DESIGN ?= examples/plain_weave.toml
 OUT ?= results/$(basename $(notdir $(DESIGN)))
-PYTEST_ARGS ?= -n auto
+PYTEST_ARGS ?= -n auto --dist loadgroup
 
 PY := $(VENV)/bin/python
 export VENV PYTHON

@@ -31,6 +31,8 @@ from circuittex.results.summary import summary
 from circuittex.results.work import EnergyBalance, balance, clamp_balance, step_balances
 from circuittex.study.run import run_study
 
+pytestmark = pytest.mark.xdist_group("energy_balance")  # what its fixtures make serves one worker
+
 TOLERANCE = 1e-7  # N, largest free force
 SAME = 1e-5
 """mm: an equilibrium found again. TOLERANCE over a fibril's stiffness in bending, 3e-3 N/mm, is 3e-5, and

@@ -25,6 +25,8 @@ from circuittex.study.circuits import StateCircuits, state_circuits
 from circuittex.study.export import detailed_netlist, probe_netlist, reduced_netlist, simplified
 from circuittex.study.run import run_study
 
+pytestmark = pytest.mark.xdist_group("export")  # what its fixtures make serves one worker
+
 PAGE = Path(__file__).parents[1] / "docs" / "netlist.md"
 FIT = with_network(Fit(0.3, 200.0, 0.0, np.zeros((2, 2)), "relative", (), np.zeros(3)), (4, 4))
 

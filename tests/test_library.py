@@ -19,6 +19,8 @@ from circuittex.study.export import simplified
 from circuittex.study.library.export import export_library
 from circuittex.study.plan import plan
 
+pytestmark = pytest.mark.xdist_group("library")  # what its fixtures make serves one worker
+
 STUDY = study()
 EXACT = 1e-9
 """Relative: ngspice's elimination of some hundred resistors beside a reduction by other means."""

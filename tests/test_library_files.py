@@ -22,6 +22,8 @@ from circuittex.study.library.export import export_library
 from circuittex.study.library.network import Network
 from circuittex.study.library.subcircuit import library_text
 
+pytestmark = pytest.mark.xdist_group("library_files")  # what its fixtures make serves one worker
+
 SECONDS = 60
 NUMBER = r"[0-9]+(?:\.[0-9]+)?(?:e[+-]?[0-9]+)?"
 WORD = r"[a-z][a-z0-9_]*"

@@ -20,15 +20,19 @@ from circuittex.base.arrays import Floats
 from circuittex.base.errors import DesignError
 from circuittex.command.cli import main
 from circuittex.command.exit_codes import ExitCode
+from circuittex.design import Yarn
 from circuittex.electrical.network.circuit import build_circuit, yarn_end_terminals
 from circuittex.electrical.network.ports import port_matrix, resistances
 from circuittex.electrical.spice.ngspice import run_deck
+from circuittex.results.records import Study
 from circuittex.results.store import write_study_start
 from circuittex.study.export import simplified
 from circuittex.study.library.bicubic import left_out, patches, value_at
 from circuittex.study.library.export import export_library
 from circuittex.study.library.interpolation import pieces, value
 from circuittex.study.library.strain_grid import grids
+
+pytestmark = pytest.mark.xdist_group("library_grid")  # what its fixtures make serves one worker
 
 STUDY = grid_study()
 X, SHEAR = (0.0, 0.025, 0.06), (-0.04, -0.01, 0.0)
@@ -61,7 +65,7 @@ def state_at(x: float, shear: float) -> tuple[float, ...]:
     return tuple(float(R[names.index(a), names.index(b)]) for a, b in PAIRS)
 
 
-def measured(library: Path, name: str, strains: Iterable[tuple[float, float]]) -> tuple[Floats, Floats]:
+def measured(library: Path, name: str, strains: Iterable[tuple[float, float]], more: str = "") -> tuple[Floats, Floats]:
     """(S, pairs) resistances that a part answers at pairs of strains, and its flags: all in one deck."""
     pins = pins_of((library / f"{name}.lib").read_text("ascii"))
     lines = [f"* {name}", f".include {library / name}.lib"]
@@ -70,7 +74,7 @@ def measured(library: Path, name: str, strains: Iterable[tuple[float, float]]) -
         for p, (a, b) in enumerate(PAIRS):
             end = f"_{s}_{p}"
             nodes = " ".join({a: f"in{end}", b: "0"}.get(pin, f"{pin}{end}") for pin in pins)
-            given = f"stretch_x={x!r} shear={shear!r}" if name.endswith("_s") else ""
+            given = f"stretch_x={x!r} shear={shear!r} {more}" if name.endswith("_s") else ""
             lines += [f"X{end} {nodes} {name} {given}", f"I{end} 0 in{end} 1"]
             if name.endswith("_v"):
                 lines += [f"Vx{end} stretch_x{end} 0 {x!r}", f"Vs{end} shear{end} 0 {shear!r}"]
@@ -321,3 +325,59 @@ def test_the_interpolation_converges_on_finer_grids() -> None:
     errors = [off(steps) for steps in (4, 8, 16)]
     assert errors[0] / errors[1] > 4.0
     assert errors[1] / errors[2] > 4.0
+
+
+@pytest.fixture(scope="module")
+def packings(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three packings whose resistances are all those of the study over 0.8 to 1.2, within tolerances of 10 %."""
+    folder = tmp_path_factory.mktemp("packings")
+    weave = STUDY.design.weave
+
+    def tolerated(yarns: tuple[Yarn, ...]) -> tuple[Yarn, ...]:
+        return tuple(replace(y, materials=tuple(replace(m, tolerance=0.1) for m in y.materials)) for y in yarns)
+
+    design = replace(
+        STUDY.design,
+        weave=replace(weave, warp=tolerated(weave.warp), weft=tolerated(weave.weft)),
+        contact=replace(STUDY.design.contact, tolerance=0.1),
+    )
+    made = replace(STUDY, design=design)
+    terminals = yarn_end_terminals(STUDY.mesh)
+
+    def member(factor: float) -> Study:
+        records = []
+        for record in made.records:
+            found = port_matrix(build_circuit(simplified(design, record.contacts).contacts, terminals))
+            records.append(replace(record, ports=replace(found, conductance=factor * found.conductance)))
+        return replace(made, records=tuple(records))
+
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr("circuittex.study.library.export.write_datasheet", lambda *_: None)
+        monkeypatch.setattr("circuittex.study.library.facts.fit_corners", lambda *_: ())  # of the cells: elsewhere
+        export_library(made, folder, dialects=("ngspice",), members=map(member, (0.8, 1.0, 1.2)))
+    return folder / "ngspice"
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "factor"),
+    [
+        ("mc", "mc=0", 1.0),
+        ("mc", "mc=-1.6448536269514722", 1.18),
+        ("mc", "mc=1.6448536269514722", 0.82),
+        ("tol", "tol=1", 1 / 1.1),
+        ("tol", "tol=-0.5", 1 / 0.95),
+    ],
+)
+def test_a_place_among_packings_and_tolerances_beside_both_strains(
+    packings: Path, name: str, given: str, factor: float
+) -> None:
+    """The 5th and 95th percentile of three equidistant factors lie at 0.05 and 0.95 of their range."""
+    states = [(0.025, -0.04), (0.06, -0.01)]
+    found, flags = measured(packings, f"fabric_ports_{name}_stretch_x_shear_s", states, given)
+    np.testing.assert_allclose(found, np.array([state_at(*state) for state in states]) / factor, rtol=SAMPLED)
+    np.testing.assert_allclose(flags, 0.0, atol=1e-12)
+
+
+def test_the_datasheet_draws_the_grid(library: Path) -> None:
+    assert "under two strains at once" in (library.parent / "datasheet.html").read_text("utf-8")
+    assert (library.parent / "figures" / "grid.png").stat().st_size > 10_000

@@ -22,6 +22,8 @@ from circuittex.results.records import Study
 from circuittex.study.export import simplified
 from circuittex.study.library.export import export_library
 
+pytestmark = pytest.mark.xdist_group("library_temperature")  # what its fixtures make serves one worker
+
 FIBRIL, CONTACT = (0.0039, 6e-7), (-0.0012, 2e-6)
 """tc1 and tc2 of the fibrils, about those of copper, and of the contacts, whose resistance falls."""
 PAIRS = [("warp1_minus", "warp1_plus"), ("warp1_minus", "weft2_plus"), ("weft1_minus", "warp2_plus")]

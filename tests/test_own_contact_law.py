@@ -19,6 +19,8 @@ from circuittex.base.errors import DesignError
 from circuittex.contact.conductance import PER_TOUCH
 from circuittex.design import contact_laws
 
+pytestmark = pytest.mark.xdist_group("own_contact_law")  # what its fixtures make serves one worker
+
 PAGE = Path(__file__).parent.parent / "docs" / "add_contact_law.md"
 
 

@@ -17,6 +17,8 @@ from circuittex.geometry.weave import build_mesh
 from circuittex.relaxation.increment import advance
 from circuittex.relaxation.relax import clamp_force, relax
 
+pytestmark = pytest.mark.xdist_group("paper_cell")  # what its fixtures make serves one worker
+
 MOST_ITERATIONS = 80
 """What a relaxation of this cell, and any step of 2.5 %, may take."""
 SYMMETRY = 1e-5

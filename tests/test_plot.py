@@ -42,6 +42,8 @@ from circuittex.results.plot.style import COLOURS, save, style
 from circuittex.results.records import Study
 from circuittex.results.store.archive import Digests
 
+pytestmark = pytest.mark.xdist_group("plot")  # what its fixtures make serves one worker
+
 STUDY = synthetic_study(2, contacts=40, rows=(3,), loadings=("stretch", "shear"))
 SVG = "{http://www.w3.org/2000/svg}"
 LINK = "{http://www.w3.org/1999/xlink}href"

@@ -28,6 +28,8 @@ from circuittex.electrical.network.reactance import (
 from circuittex.geometry.weave import build_mesh
 from circuittex.study.library.export import export_library
 
+pytestmark = pytest.mark.xdist_group("reactance")  # what its fixtures make serves one worker
+
 Lines = NDArray[np.float64]
 LENGTH, RADIUS = 16.0, 1.0
 """mm, of both wires."""

@@ -33,6 +33,8 @@ from circuittex.results.store import load_study
 from circuittex.results.summary import summary
 from circuittex.study.run import run_study
 
+pytestmark = pytest.mark.xdist_group("weave_physics")  # what its fixtures make serves one worker
+
 STRETCHED = np.diag([1.05, 1.0])
 
 

@@ -29,6 +29,8 @@ CAPTIONS = {
     "errors_cell": "Largest error of the cell of Ry and Rc at each pair of pins, over all states.",
     "errors_ports_thin": "Largest error of the thinned ports at each pair of pins, over all states.",
     "strain": "Change of the resistance between two pins, all others open: computed states and what the cells answer.",
+    "grid": "Change of the resistance between two pins, all others open, under two strains at once: computed states as "
+    "points in the colour of their change, what the sub-circuits answer as the colour behind them.",
     "network": "Medians of Ry and Rc of the fitted cell.",
 }
 NO_GRID = {

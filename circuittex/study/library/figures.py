@@ -13,6 +13,7 @@ from circuittex.base.arrays import Floats
 from circuittex.electrical.network.ports import resistances
 from circuittex.results.plot.style import COLOURS, MARKERS, new_figure, save, style
 from circuittex.study.library.accuracy import Errors
+from circuittex.study.library.bicubic import patches, value_at
 from circuittex.study.library.facts import Facts
 from circuittex.study.library.interpolation import pieces, value
 from circuittex.study.library.network import matrix_at, ports_network
@@ -20,8 +21,8 @@ from circuittex.study.library.strain_path import StrainPath
 
 SHOWN = 4
 """Pairs of pins whose resistance is drawn against strain."""
-FINE = 60
-"""Strains at which a curve is drawn."""
+FINE, COARSE = 60, 24
+"""Strains at which a curve is drawn, and along either side of a grid."""
 
 
 def save_figures(known: Facts, folder: Path) -> Mapping[str, bytes]:
@@ -31,6 +32,8 @@ def save_figures(known: Facts, folder: Path) -> Mapping[str, bytes]:
         figures = {f"errors_{level}": _heat_map(level, errors) for level, errors in known.errors.items()}
         if known.paths:
             figures["strain"] = _against_strain(known)
+        if known.grids:
+            figures["grid"] = _over_grids(known)
         if known.paths and not known.levels.reason:
             figures["network"] = _network(known)
     return {name: save(figure, folder, name)[0].read_bytes() for name, figure in figures.items()}
@@ -58,6 +61,40 @@ def _against_strain(known: Facts) -> Figure:
     for axes, path in zip(np.atleast_1d(figure.subplots(1, len(known.paths))), known.paths, strict=True):
         _curves(axes, known, path)
     return figure
+
+
+def _over_grids(known: Facts) -> Figure:
+    """Change of one resistance over the strains of each grid: states as points, what the sub-circuits answer as colour.
+
+    The pair of pins is the one whose resistance changes most.
+    """
+    figure = new_figure(5.0 * len(known.grids), 3.8)
+    for axes, grid in zip(np.atleast_1d(figure.subplots(1, len(known.grids))), known.grids, strict=True):
+        own = [known.levels.ports[k] for k in grid.records.ravel()]
+        network = ports_network(own, np.arange(float(len(own))))
+        on = patches(grid.first, grid.second, network.conductance.reshape(*grid.records.shape, -1))
+        exact = np.array([resistances(matrix) for matrix in own])
+        relaxed = resistances(known.levels.ports[grid.records[_nearest(grid.first), _nearest(grid.second)]])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            change = np.where(np.isfinite(exact) & (exact > 0.0), exact / relaxed - 1.0, 0.0)
+        _, i, j = np.unravel_index(int(np.argmax(np.abs(change))), change.shape)
+        x, y = (np.linspace(strain[0], strain[-1], COARSE) for strain in (grid.first, grid.second))
+        ohm = np.array([[resistances(matrix_at(network, value_at(on, a, b)))[i, j] for a in x] for b in y])
+        shown = 100 * (ohm / relaxed[i, j] - 1.0)
+        edges = 100 * x[0], 100 * x[-1], 100 * y[0], 100 * y[-1]
+        image = axes.imshow(shown, origin="lower", extent=edges, aspect="auto", cmap="viridis")
+        places = np.array(np.meshgrid(grid.first, grid.second, indexing="ij")).reshape(2, -1)
+        axes.scatter(*(100 * places), c=100 * change[:, i, j], cmap="viridis", norm=image.norm, edgecolors="white")
+        names = [f"{axis} (%)" for axis in grid.axes]
+        axes.set(title=f"{known.levels.pins[i]}, {known.levels.pins[j]}", xlabel=names[0], ylabel=names[1])
+        axes.grid(visible=False)
+        figure.colorbar(image, ax=axes, label="change of resistance (%)")
+    return figure
+
+
+def _nearest(strain: Floats) -> int:
+    """The strain nearest to none."""
+    return int(np.argmin(np.abs(strain)))
 
 
 def _curves(axes: Axes, known: Facts, path: StrainPath) -> None:

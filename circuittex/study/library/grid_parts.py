@@ -13,20 +13,25 @@ from circuittex.design import Design
 from circuittex.electrical.network.names import unique_names
 from circuittex.study.library.levels import Levels
 from circuittex.study.library.network import FLAG, Axis, Network, circuit_network, ports_network
-from circuittex.study.library.parts import TITLES, Part, strained, unit_network
-from circuittex.study.library.reduction import Reduction
+from circuittex.study.library.parts import TITLES, Part, monte_carlo, strained, tolerated, unit_network
+from circuittex.study.library.reduction import CORNERS, TOLERANCES, Reduction
 from circuittex.study.library.strain_grid import StrainGrid
 
 
 def grid_parts(
     name: str, design: Design, known: Levels, reductions: Sequence[Reduction], grid: StrainGrid
 ) -> Iterator[Part]:
-    """Ports, cell and unit with both strains as parameters and as pins."""
+    """Ports, cell and unit with both strains as parameters and as pins, and ports with a place among the corners of an
+    ensemble, or within tolerances, as a third parameter."""
     states = grid.records.ravel().tolist()
     number = np.arange(float(len(states)))
+    networks = {each.end: on_grid(ports_network([each.ports[k] for k in states], number), grid) for each in reductions}
     for each in reductions:
-        network = ports_network([each.ports[k] for k in states], number)
-        yield from strained(name, design, "ports", each.end, each.title, on_grid(network, grid), grid.word)
+        yield from strained(name, design, "ports", each.end, each.title, networks[each.end], grid.word)
+    if set(CORNERS) <= set(networks):
+        yield from monte_carlo(name, design, "ports", [networks[end] for end in CORNERS], grid.word)
+    if set(TOLERANCES) <= set(networks):
+        yield from tolerated(name, design, networks, grid.word)
     if known.reason:
         return
     try:

@@ -18,7 +18,6 @@ from circuittex.study.library.levels import Levels
 from circuittex.study.library.network import (
     FLAG,
     SPREAD,
-    STRAIN,
     WITHIN,
     Network,
     circuit_network,
@@ -82,7 +81,7 @@ def fixed_parts(
     for each in reductions:
         yield _fixed(name, design, "ports", each.end, each.title, networks[each.end])
     if set(TOLERANCES) <= set(networks):
-        yield from _tolerated(name, design, networks)
+        yield from tolerated(name, design, networks)
     if not known.reason:
         network = circuit_network([known.cells[state]], nothing, known.pins)
         yield _fixed(name, design, "cell", "", TITLES["cell"], network)
@@ -113,9 +112,9 @@ def strained_parts(
     for each in reductions:
         yield from strained(name, design, "ports", each.end, each.title, networks[each.end], path.word)
     if set(CORNERS) <= set(networks):
-        yield from _monte_carlo(name, design, "ports", [networks[end] for end in CORNERS], path)
+        yield from monte_carlo(name, design, "ports", [networks[end] for end in CORNERS], path.word)
     if set(TOLERANCES) <= set(networks):
-        yield from _tolerated(name, design, networks, path)
+        yield from tolerated(name, design, networks, path.word)
     if known.reason:
         return
     try:
@@ -133,41 +132,41 @@ def strained_parts(
     for fit, network in zip(fits, at, strict=True):
         yield from strained(name, design, "cell", fit.end, _title(fit), network, path.word)
     if fits:
-        yield from _monte_carlo(name, design, "cell", at, path)
+        yield from monte_carlo(name, design, "cell", at, path.word)
 
 
-def _monte_carlo(name: str, design: Design, level: str, corners: Sequence[Network], path: StrainPath) -> Iterator[Part]:
-    """The ports or the cell with a place among the corners as a parameter beside the strain."""
+def monte_carlo(name: str, design: Design, level: str, corners: Sequence[Network], word: str) -> Iterator[Part]:
+    """The ports or the cell with a place among the corners as a parameter beside the strains; `word` of their path."""
     low, middle, high = corners
     if not low.names == middle.names == high.names:
-        text = f"no part with the parameter {SPREAD} for {path.loading!r}: some packings lack resistors of others"
+        text = f"no part with the parameter {SPREAD} for {word!r}: some packings lack resistors of others"
         warnings.warn(text, CircuittexWarning, stacklevel=3)
         return
     what = "reduction to the pins" if level == "ports" else "Ry and Rc"
-    title = f"{what}, parameters: strain, and {SPREAD} in standard deviations of all resistors at once"
-    given = ((STRAIN, "0"), (SPREAD, "0"))
-    full = f"{name}_{level}_{SPREAD}_{path.word}{PARAMETER}"
-    yield Part(
-        full, level, f"_{SPREAD}", title, middle, (*pins(design, middle), FLAGGED), given, path.word, (low, high)
-    )
+    words = [axis.word for axis in middle.axes]
+    title = f"{what}, parameters: {', '.join(words)}, and {SPREAD} in standard deviations of all resistors at once"
+    given = (*((each, "0") for each in words), (SPREAD, "0"))
+    full = f"{name}_{level}_{SPREAD}_{word}{PARAMETER}"
+    yield Part(full, level, f"_{SPREAD}", title, middle, (*pins(design, middle), FLAGGED), given, word, (low, high))
 
 
-def _tolerated(
-    name: str, design: Design, networks: Mapping[str, Network], path: StrainPath | None = None
-) -> Iterator[Part]:
-    """The ports with a place within the tolerances as a parameter, beside that of a strain where there is a path."""
+def tolerated(name: str, design: Design, networks: Mapping[str, Network], word: str = "") -> Iterator[Part]:
+    """The ports with a place within the tolerances as a parameter, beside those of the strains of a path or grid."""
     middle, low, high = (networks[end] for end in ("", *TOLERANCES))
     if not low.names == middle.names == high.names:
         return  # a tolerance of the whole resistance may open what another state joins
     title = f"reduction to the pins, {WITHIN} from -1 to 1: all resistivities from the low to the high end of tolerance"
-    given: tuple[tuple[str, str], ...] = ((WITHIN, "0"),)
     base, own = f"{name}_ports_{WITHIN}", pins(design, middle)
-    if path is None:
+    given: tuple[tuple[str, str], ...] = ((WITHIN, "0"),)
+    if not word:
         yield Part(base, "ports", f"_{WITHIN}", title, middle, own, given, "", (low, high))
         return
-    title, given = f"{title}; strain of the loading as a parameter", ((STRAIN, "0"), *given)
-    full = f"{base}_{path.word}{PARAMETER}"
-    yield Part(full, "ports", f"_{WITHIN}", title, middle, (*own, FLAGGED), given, path.word, (low, high))
+    words = [axis.word for axis in middle.axes]
+    title = f"{title}; {' and '.join(words) if middle.grid else 'strain of the loading'} as a parameter"
+    given = (*((each, "0") for each in words), *given)
+    yield Part(
+        f"{base}_{word}{PARAMETER}", "ports", f"_{WITHIN}", title, middle, (*own, FLAGGED), given, word, (low, high)
+    )
 
 
 def strained(

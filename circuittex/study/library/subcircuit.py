@@ -20,8 +20,6 @@ from circuittex.study.library.network import (
     FLAG,
     SPREAD,
     SPREAD_USED,
-    STRAIN,
-    USED,
     WITHIN,
     WITHIN_USED,
     Axis,
@@ -164,25 +162,23 @@ def _by_parameter(network: Network, dialect: Dialect) -> list[str]:
             known.devices, network.nodes, known.own.tolist(), _coefficients(network), strict=True
         )
     ]
-    given = [axis.word for axis in known.axes]
-    return [*lines, f"V{FLAG} {FLAG} 0 {{{_outside(given, known.axes, dialect)}}}"]
+    return [*lines, _flag(network, dialect)]
 
 
 def _by_spread(network: Network, low: Network, high: Network, dialect: Dialect) -> list[str]:
     """As `_by_parameter`, and the logarithm of every resistance goes with the parameter mc from that of the median
     towards that of its 5th percentile (mc = -1.645) or its 95th (1.645), and straight on as far as `FURTHEST`."""
     lines = [f".param {SPREAD_USED}={{min(max({SPREAD},-{FURTHEST!r}),{FURTHEST!r})/{NORMAL!r}}}"]
-    lines.append(f".param {USED}={{{_clamped(STRAIN, *network.axes)}}}")
+    lines += _used(network)
     cards = zip(network.names, network.nodes, _coefficients(network), strict=True)
     for k, (name, (a, b), tc) in enumerate(cards):
         words = [f"{kind}_{k + 1}" for kind in ("middle", "low", "high")]
         for word, each in zip(words, (network, low, high), strict=True):
-            own = pieces(each.strain, each.conductance[:, [k]])
-            lines.append(f".param {word}={{{_log_conductance(own, 0, USED, dialect)}}}")
+            lines.append(f".param {word}={{{_log_at(each, k, dialect)}}}")
         middle, lower, upper = words
         share = dialect.choose(f"{SPREAD_USED}<0", f"{middle}-{lower}", f"{upper}-{middle}")
         lines.append(f"R{name} {a} {b} {{exp(-{middle}-{SPREAD_USED}*{share})}}{tc}")
-    return [*lines, f"V{FLAG} {FLAG} 0 {{{_outside([STRAIN], network.axes, dialect)}}}"]
+    return [*lines, _flag(network, dialect)]
 
 
 def _within_tolerance(network: Network, low: Network, high: Network, dialect: Dialect) -> list[str]:
@@ -191,22 +187,36 @@ def _within_tolerance(network: Network, low: Network, high: Network, dialect: Di
     lines = [f".param {WITHIN_USED}={{min(max({WITHIN},-1),1)}}"]
     strained = len(network.strain) > 1
     if strained:
-        lines.append(f".param {USED}={{{_clamped(STRAIN, *network.axes)}}}")
+        lines += _used(network)
     cards = zip(network.names, network.nodes, _coefficients(network), strict=True)
     for k, (name, (a, b), tc) in enumerate(cards):
         words = [f"{kind}_{k + 1}" for kind in ("middle", "low", "high")]
         for word, each in zip(words, (network, low, high), strict=True):
-            ohm = repr(1.0 / float(each.conductance[0, k]))
-            if strained:
-                own = pieces(each.strain, each.conductance[:, [k]])
-                ohm = f"exp(-{_log_conductance(own, 0, USED, dialect)})"
-            lines.append(f".param {word}={{{ohm}}}")
+            fixed = repr(1.0 / float(each.conductance[0, k]))
+            lines.append(f".param {word}={{{f'exp(-{_log_at(each, k, dialect)})' if strained else fixed}}}")
         middle, lower, upper = words
         share = dialect.choose(f"{WITHIN_USED}<0", f"{middle}-{lower}", f"{upper}-{middle}")
         lines.append(f"R{name} {a} {b} {{{middle}+{WITHIN_USED}*{share}}}{tc}")
-    if strained:
-        lines.append(f"V{FLAG} {FLAG} 0 {{{_outside([STRAIN], network.axes, dialect)}}}")
-    return lines
+    return [*lines, _flag(network, dialect)] if strained else lines
+
+
+def _used(network: Network) -> list[str]:
+    """Parameters for the strains within their ranges."""
+    return [f".param {axis.word}_used={{{_clamped(axis.word, axis)}}}" for axis in network.axes]
+
+
+def _log_at(network: Network, k: int, dialect: Dialect) -> str:
+    """The logarithm of the conductance of one resistor, in S, at the strains of `_used`."""
+    strains = [f"{axis.word}_used" for axis in network.axes]
+    found = _between(network, network.conductance[:, [k]])
+    if isinstance(found, Patches):
+        return patch_of(found, 0, strains[0], strains[1], dialect)
+    return _log_conductance(found, 0, strains[0], dialect)
+
+
+def _flag(network: Network, dialect: Dialect) -> str:
+    """The source of the flag where strains are parameters."""
+    return f"V{FLAG} {FLAG} 0 {{{_outside([axis.word for axis in network.axes], network.axes, dialect)}}}"
 
 
 def _by_pin(network: Network, dialect: Dialect) -> list[str]:

@@ -32,6 +32,7 @@ PURE = {
     *("Numerics.overlap_warning", "Numerics.overlap_limit", "ContactLaw.exponent", "MaterialPair.exponent"),
     *("Material.tolerance", "ContactLaw.tolerance", "MaterialPair.tolerance", "Yarn.crimp", "Yarn.heat_set"),
     "Electrical.permittivity",
+    "Electrical.emissivity",
 }
 """Every field with pure numbers that are no counts. A field that is not here names its unit in the text below it."""
 

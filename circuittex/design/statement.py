@@ -48,6 +48,43 @@ class Electrical:
         default=True, metadata=flag("whether the Joule heat of the contacts warms the fibrils", shown=True)
     )
     """Whether the Joule heat of the contacts warms the fibrils, half to each side."""
+    heat_loss: float = field(
+        default=0.0,
+        kw_only=True,
+        metadata=number(
+            "W/(mm2 K)",
+            "h >= 0 from the outline of each yarn to the air; its fibrils share it; still air takes 5 to 25 W/(m2 K)",
+            shown="0 W/(m2 K)",
+            at_least=0,
+            at_most=1,
+        ),
+    )
+    """h, W/(mm2 K): heat that leaves along the outline of each yarn, for each kelvin above the surroundings."""
+    emissivity: float = field(
+        default=0.0,
+        kw_only=True,
+        metadata=number(
+            "1",
+            "of the same outline, 0 to 1, for surroundings at 300 K; linear in the rise: textiles 0.9, metal 0.05",
+            shown="0.0",
+            at_least=0,
+            at_most=1,
+        ),
+    )
+    """Emissivity of the outline of each yarn, in surroundings at 300 K."""
+    thermal_ends: float | str = field(
+        default="cold",
+        kw_only=True,
+        metadata=number(
+            "K/W",
+            '"cold": fibril ends stay as cool as the surroundings (the paper\'s); "insulated"; or the thermal '
+            "resistance of each yarn end",
+            shown="cold",
+            above=0,
+            words=("cold", "insulated"),
+        ),
+    )
+    """'cold': fibril ends stay as cool as the surroundings; 'insulated'; or the resistance of each yarn end, K/W."""
     permittivity: float = field(
         default=1.0,
         kw_only=True,
@@ -77,6 +114,9 @@ class Electrical:
 
     def __post_init__(self) -> None:
         check(self, "electrical")
+        if self.thermal_ends == "insulated" and not (self.heat_loss or self.emissivity):
+            allowed = "heat must leave somewhere: it needs electrical.heat_loss or electrical.emissivity > 0"
+            raise refuse("electrical.thermal_ends", self.thermal_ends, allowed)
 
 
 @frozen

@@ -7,6 +7,7 @@ import numpy as np
 from circuittex.base.arrays import Floats
 from circuittex.base.frozen import frozen
 from circuittex.contact.state import ContactState
+from circuittex.design import Design
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results.records import Record, Study
 
@@ -107,6 +108,13 @@ def widest_on_shell(study: Study, contacts: ContactState) -> float:
     return float((contacts.width / np.minimum(thickness[a], thickness[b]))[rows].max(initial=0.0))
 
 
+def _unreal(design: Design) -> str:
+    """What else is not as in a room where fibrils get hot."""
+    if design.electrical.heat_loss or design.electrical.emissivity:
+        return "polymers have melted or charred, and "
+    return "no heat is lost to the air (electrical.heat_loss) and "
+
+
 @frozen
 class Doubt:
     """One reason to doubt a state."""
@@ -143,8 +151,8 @@ def doubts(study: Study, record: Record) -> tuple[Doubt, ...]:
         Doubt(
             "temperature",
             rise / HOT,
-            f"the temperature rises by up to {rise:.3g} K (warned of from {HOT:g} K on): no heat is lost "
-            "to the air in this model and conductivities are constant, so that this is no prediction",
+            f"the temperature rises by up to {rise:.3g} K (warned of from {HOT:g} K on): {_unreal(study.design)}"
+            "conductivities are constant, so that this is no prediction",
         ),
         Doubt(
             "mesh",

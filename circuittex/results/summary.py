@@ -31,6 +31,9 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
         one) by the trapezoidal rule, how much of it was stored, and the rest; null for the relaxed state
     ``currents_A``, ``peak_temperature_K``
         current of each probe, and the largest temperature rise over all probes
+    ``heating``
+        of each probe: ``power_W``, ``power_density_W_cm2`` of the fabric, ``peak_temperature_K``, and ``along_yarns``,
+        the part of the heat that leaves along the yarns rather than at their ends
     ``Ry_ohm``, ``Rc_ohm``, ``fit_residual``, ``fit_warnings``, ``network``, ``ports``
         the reduced network, its misfit, and what the fit warns of; ``Ry_ohm`` is null where there are several kinds of
         yarn, ``network`` has ``fitted_to``, ``Ry_ohm`` of each kind, ``Rc_ohm`` of each pair of kinds that cross,
@@ -89,6 +92,7 @@ from circuittex.fit import Fit
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results.bifurcation import BranchCheck, branch_statement, current_difference, force_difference
 from circuittex.results.discretisation import ErrorEstimate
+from circuittex.results.heating import heating
 from circuittex.results.records import Record, Study
 from circuittex.results.soundness import deepest_overlap, doubt_statement, doubts, surface_stress
 from circuittex.results.verification import AGREEMENT
@@ -328,6 +332,7 @@ def _state(study: Study, record: Record, step: EnergyBalance | None) -> dict[str
         "energy_loss_N_mm": None if step is None else step.loss.item(),
         "currents_A": record.currents,
         "peak_temperature_K": record.peak_temperature,
+        "heating": [each.as_numbers() for each in heating(study, record)],
         "Ry_ohm": record.fit.Ry,
         "Rc_ohm": record.fit.Rc,
         "fit_residual": record.fit.residual,

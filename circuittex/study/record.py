@@ -10,7 +10,7 @@ from circuittex.base.errors import CircuitError, ConvergenceError, PenetrationEr
 from circuittex.base.frozen import frozen
 from circuittex.contact.extract import contacts_of
 from circuittex.design import Design
-from circuittex.electrical.fields import Fields, solve_probes
+from circuittex.electrical.fields import Fields, cooling_of, solve_probes
 from circuittex.electrical.network.circuit import Circuit, build_circuit
 from circuittex.electrical.network.nodal import solve_nodal
 from circuittex.electrical.network.one_pair import yarn_conductance
@@ -103,7 +103,13 @@ def record_state(study: Study, step: Step, reached: Increment, say: Callable[[st
     design, mesh, equilibrium = study.design, study.mesh, reached.equilibrium
     contacts = contacts_of(design, mesh, equilibrium.configuration)
     check_sound(study, step, equilibrium.configuration.r, contacts)
-    fields = solve_probes(contacts, design.terminals, design.probes, contact_heat=design.electrical.contact_heat)
+    fields = solve_probes(
+        contacts,
+        design.terminals,
+        design.probes,
+        contact_heat=design.electrical.contact_heat,
+        cooling=cooling_of(design, mesh),
+    )
     circuits = state_circuits(simplified(design, contacts), design.terminals, design.probes)
     whole = probe_circuits(contacts, design.terminals, design.probes)
     ports = port_matrix(circuits.conducting)

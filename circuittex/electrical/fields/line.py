@@ -36,13 +36,14 @@ class FibrilLine:
     """(2, C) coordinate of the foot in its element, 0 to 1."""
 
 
-def fibril_line(contacts: ContactState, *, refine: bool) -> FibrilLine:
-    """The mesh of the mechanics or, refined, the one whose nodes are the feet of the contacts."""
+def fibril_line(contacts: ContactState, *, refine: bool, elements: bool = False) -> FibrilLine:
+    """The mesh of the mechanics or, refined, the one whose nodes are the feet of the contacts; with `elements` those of
+    the mechanics as well."""
     mesh = contacts.mesh
     foot_fibril = np.stack([contacts.fibril_a, contacts.fibril_b])
     foot_xi = _checked_feet(mesh, foot_fibril, np.stack([contacts.xi_a, contacts.xi_b]))
     if refine:
-        fibril, xi, foot_xi = _refined_nodes(contacts, foot_fibril, foot_xi)
+        fibril, xi, foot_xi = _refined_nodes(contacts, foot_fibril, foot_xi, elements)
     else:
         fibril, xi = mesh.node_fibril, mesh.xi
     left = np.flatnonzero(fibril[1:] == fibril[:-1])
@@ -78,14 +79,17 @@ def _checked_feet(mesh: FibrilMesh, fibril: Ints, xi: Floats) -> Floats:
     return on_fibril
 
 
-def _refined_nodes(contacts: ContactState, foot_fibril: Ints, foot_xi: Floats) -> tuple[Ints, Floats, Floats]:
-    """Nodes at the ends, at the feet and, where the conduction varies along the axis, between the elements.
+def _refined_nodes(
+    contacts: ContactState, foot_fibril: Ints, foot_xi: Floats, elements: bool
+) -> tuple[Ints, Floats, Floats]:
+    """Nodes at the ends, at the feet and, if asked for or the conduction varies along the axis, between the elements.
 
     Returns fibril and coordinate of the nodes, and the coordinate of the node that each foot became.
     """
     mesh = contacts.mesh
     every = np.arange(mesh.n_fibrils)
-    breaks = mesh.elements[:, 0] if np.any(contacts.axial_factor != 1.0) else np.empty(0, dtype=np.int64)
+    varies = elements or np.any(contacts.axial_factor != 1.0)
+    breaks = mesh.elements[:, 0] if varies else np.empty(0, dtype=np.int64)
     fibril = np.concatenate([every, every, mesh.node_fibril[breaks], foot_fibril.ravel()])
     xi = np.concatenate([np.zeros(mesh.n_fibrils), mesh.length, mesh.xi[breaks], foot_xi.ravel()])
     permutation = np.lexsort((xi, fibril))

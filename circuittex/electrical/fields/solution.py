@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -16,8 +17,17 @@ from circuittex.base.errors import DesignError
 from circuittex.base.frozen import frozen
 from circuittex.contact.state import ContactState
 from circuittex.design import Probe, Terminal
+from circuittex.electrical.fields.cooling import COLD_ENDS, Cooling
 from circuittex.electrical.fields.line import FibrilLine, fibril_line
-from circuittex.electrical.fields.system import System, balance, build_system, constant_source, outflow, peak
+from circuittex.electrical.fields.system import (
+    System,
+    balance,
+    build_system,
+    constant_source,
+    outflow,
+    peak,
+    surface_loss,
+)
 from circuittex.geometry.mesh import FibrilMesh
 
 Mesh = Literal["feet", "mechanical"]
@@ -65,6 +75,8 @@ class Fields(Potential):
     """Largest temperature rise, inside the elements included, K."""
     unreached: Ints
     """(U,) conducting fibrils that no driven terminal reaches."""
+    heat_lost: float = 0.0
+    """Heat that leaves along the fibrils, W."""
 
 
 def solve_fields(
@@ -74,6 +86,7 @@ def solve_fields(
     *,
     contact_heat: bool = True,
     mesh: Mesh = "feet",
+    cooling: Cooling = COLD_ENDS,
 ) -> Fields:
     """Solve [38] for the potential and then [37] for the temperature of one probe.
 
@@ -88,7 +101,7 @@ def solve_fields(
     >>> solve_fields(untouched, design.terminals, design.probes[0]).currents.round(4).tolist()
     [0.8836, -0.8836]
     """
-    return solve_probes(contacts, terminals, [probe], contact_heat=contact_heat, mesh=mesh)[0]
+    return solve_probes(contacts, terminals, [probe], contact_heat=contact_heat, mesh=mesh, cooling=cooling)[0]
 
 
 def solve_probes(
@@ -98,29 +111,37 @@ def solve_probes(
     *,
     contact_heat: bool = True,
     mesh: Mesh = "feet",
+    cooling: Cooling = COLD_ENDS,
 ) -> tuple[Fields, ...]:
     """Solve the potential [38] and the temperature [37] for each probe on a frozen contact state.
 
         sum ∫ sigma A V' dV' + sum sigma_c a w [V][dV] = 0
-        sum ∫ k A T' dT' + sum h_c a w [T][dT] = sum ∫ sigma A V'^2 dT + contact Joule heat
+        sum ∫ k A T' dT' + sum ∫ g T dT + sum h_c a w [T][dT] = sum ∫ sigma A V'^2 dT + contact Joule heat
 
     V is the probe's at its two terminals, whose fibril ends are joined; all other ends are insulated one by
-    one. T = 0 at all fibril ends. [37] has no Joule heat of the contacts; it is added here, half to each
-    side, unless `contact_heat` is off. Linear elements for V, quadratic ones for T. With `mesh` "feet" every
-    foot of a contact is a node and both fields are exact; with "mechanical" the elements are those of the
-    mechanics and the solution converges to that at second order.
+    one. T = 0 at all fibril ends, and g = 0, unless `cooling` has a loss along the fibrils or other ends. [37] has no
+    Joule heat of the contacts; it is added here, half to each side, unless `contact_heat` is off. Linear elements for
+    V, quadratic ones for T. With `mesh` "feet" every foot of a contact is a node and both fields are exact but for what
+    g makes of T between nodes, for which those of the mechanics are nodes as well; with "mechanical" the elements are
+    those of the mechanics and the solution converges to that at second order.
 
     Raises DesignError where a probe names a terminal, or a terminal a yarn end, that does not exist.
     """
-    line, axes = _line(contacts, mesh)
+    line, axes = _line(contacts, mesh, elements=len(cooling.loss) > 0)
     if not probes:
         return ()
     flows = _flows(contacts, line, axes, terminals, probes)
     thermal = build_system(Basis(axes, ElementLineP2()), line, line.thermal, contacts.heat_conductance)
     loads = np.stack([_joule_heat(thermal, flow, contact_heat) for flow in flows])
-    inside = np.delete(np.arange(loads.shape[1]), line.ends)
+    every = np.arange(loads.shape[1])
+    surface, through, held = _losses(line, thermal, cooling)
+    if len(cooling.loss) or not held:
+        thermal = replace(thermal, loss=surface + through)
+    inside = np.delete(every, line.ends) if held else every
     temperatures = balance(thermal, loads, np.zeros(loads.shape[1]), inside)
-    return tuple(_fields(line, thermal, *one) for one in zip(probes, flows, loads, temperatures, strict=True))
+    return tuple(
+        _fields(line, thermal, surface, cooling, *one) for one in zip(probes, flows, loads, temperatures, strict=True)
+    )
 
 
 def solve_potentials(
@@ -138,26 +159,51 @@ def solve_potentials(
     )
 
 
-def _line(contacts: ContactState, mesh: Mesh) -> tuple[FibrilLine, MeshLine]:
+def _losses(line: FibrilLine, thermal: System, cooling: Cooling) -> tuple[Any, Any, bool]:
+    """(N, N) each: what leaves along the fibrils, and through their ends; and whether these are held at T = 0."""
+    n = thermal.basis.N
+    surface = through = csr_matrix((n, n))
+    if len(cooling.loss):
+        surface = surface_loss(thermal.basis, cooling.loss[line.fibril[line.segments[:, 0]]])
+    if len(cooling.end):
+        ends = line.ends.ravel()
+        through = csr_matrix((np.tile(cooling.end, 2), (ends, ends)), shape=(n, n))
+    return surface, through, not len(cooling.end)
+
+
+def _line(contacts: ContactState, mesh: Mesh, elements: bool = False) -> tuple[FibrilLine, MeshLine]:
     """The line mesh of all fibrils, and the same for scikit-fem."""
     if mesh not in ("feet", "mechanical"):
         raise DesignError("mesh", mesh, "allowed are 'feet' and 'mechanical'")
-    line = fibril_line(contacts, refine=mesh == "feet")
+    line = fibril_line(contacts, refine=mesh == "feet", elements=elements)
     return line, MeshLine(line.xi[None, :], np.ascontiguousarray(line.segments.T), sort_t=False, validate=False)
 
 
-def _fields(line: FibrilLine, thermal: System, probe: Probe, flow: _Flow, load: Floats, temperature: Floats) -> Fields:
+def _fields(
+    line: FibrilLine,
+    thermal: System,
+    surface: Any,
+    cooling: Cooling,
+    probe: Probe,
+    flow: _Flow,
+    load: Floats,
+    temperature: Floats,
+) -> Fields:
     """What is kept of one solution."""
     ends = line.ends.ravel()
+    # At ends that are held nothing is balanced: what is left over leaves there.
+    held = not len(cooling.end)
+    through = (load - outflow(thermal, temperature))[ends] if held else np.tile(cooling.end, 2) * temperature[ends]
     return Fields(
         **_electric(line, probe, flow),
         temperature=temperature[: len(line.xi)],
         segments=line.segments,
         segment_current=flow.along,
         heat=float(load.sum()),
-        heat_out=float((load - outflow(thermal, temperature))[ends].sum()),
+        heat_out=float(through.sum()),
         peak_temperature=peak(thermal.basis, temperature),
         unreached=flow.unreached,
+        heat_lost=float((surface @ temperature).sum()),
     )
 
 

@@ -33,6 +33,8 @@ class System:
     """Two of (C, N): the field at the feet on fibrils a and b."""
     jump: Any
     """(C, N): difference of the two."""
+    loss: Any = None
+    """(N, N) what leaves to the surroundings; None where nothing does."""
 
     @property
     def stiffness(self) -> Any:
@@ -44,6 +46,12 @@ class System:
 def _conduction(u: Any, v: Any, w: Any) -> Any:
     """∫ c u' v' dxi."""
     return w.coefficient * dot(grad(u), grad(v))
+
+
+@BilinearForm  # type: ignore[untyped-decorator]
+def _mass(u: Any, v: Any, w: Any) -> Any:
+    """∫ g u v dxi."""
+    return w.density * u * v
 
 
 @LinearForm  # type: ignore[untyped-decorator]
@@ -58,6 +66,11 @@ def build_system(basis: Any, line: FibrilLine, coefficient: Floats, conductance:
     jump = foot[0] - foot[1]
     along = basis.with_element(ElementLineP0()).interpolate(coefficient)
     return System(basis, along, conductance, csr_matrix(_conduction.assemble(basis, coefficient=along)), foot, jump)
+
+
+def surface_loss(basis: Any, density: Floats) -> Any:
+    """(N, N) loss to the surroundings of `density` (S,) per length of axis."""
+    return csr_matrix(_mass.assemble(basis, density=basis.with_element(ElementLineP0()).interpolate(density)))
 
 
 def _coupling(jump: Any, conductance: Floats) -> Any:
@@ -82,7 +95,7 @@ def constant_source(basis: Any, density: Floats) -> Floats:
 
 
 def outflow(system: System, x: Floats) -> Floats:
-    """(N,) what leaves each dof through fibrils and contacts: `stiffness` times x, but element by element.
+    """(N,) what leaves each dof: `stiffness` times x, but element by element, and the loss.
 
     In the assembled matrix a short element's large conductance swamps its small neighbours; summed element by
     element, what enters it is exactly what leaves it.
@@ -94,7 +107,7 @@ def outflow(system: System, x: Floats) -> Floats:
     into = [np.sum(system.coefficient * (slope * shape) * basis.dx, axis=1) for shape in shapes]
     inside = np.bincount(dofs.ravel(), np.concatenate(into), basis.N)
     outside: Floats = system.jump.T @ (system.conductance * (system.jump @ x))
-    return inside + outside
+    return inside + outside if system.loss is None else inside + outside + system.loss @ x
 
 
 def balance(system: System, load: Floats, value: Floats, free_dofs: Ints, anchor: Ints | None = None) -> Floats:
@@ -109,6 +122,8 @@ def balance(system: System, load: Floats, value: Floats, free_dofs: Ints, anchor
     if not len(free_dofs):
         return x
     move, fibrils, jump = _measured(system, anchor)
+    if system.loss is not None:
+        fibrils = fibrils + system.loss
     # Positive definite, so no pivoting: as fast as COLAMD on the paper's cell, three times as fast on a denser one.
     # Panels and relaxed supernodes double the time on the paper's cell and save none on denser ones.
     factor = splu(

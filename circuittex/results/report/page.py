@@ -14,6 +14,7 @@ from markupsafe import Markup
 from circuittex.base.arrays import Floats
 from circuittex.base.atomic import write_text
 from circuittex.results.claims.table import Table, claims_table
+from circuittex.results.heating import heating
 from circuittex.results.plot import save_figures
 from circuittex.results.records import Record, Study
 from circuittex.results.report.branches import branch_alarm, branch_section
@@ -138,9 +139,23 @@ def _states(study: Study) -> Markup:
         states={"head": head, "rows": rows},
         forces=_forces(study),
         equilibrium=_equilibrium(study),
+        heat=_heat(study),
         effort=effort(study),
         energy=energy_section(study),
     )
+
+
+def _heat(study: Study) -> dict[str, Any]:
+    """Of the first and the last state of each loading; nothing where heat leaves at the ends alone, as in the paper."""
+    head = ["state", "probe", "power (W)", "W/cm²", "peak temperature rise (K)", "along the yarns (%)"]
+    last = {record.loading: record for record in study.records}
+    rows = [
+        [record.name, each.probe, *map(_number, (each.power, each.power_density, each.rise, 100.0 * each.along))]
+        for record in last.values()
+        for each in heating(study, record)
+    ]
+    electrical = study.design.electrical
+    return {"head": head, "rows": rows if electrical.heat_loss or electrical.emissivity else []}
 
 
 def _forces(study: Study) -> dict[str, Any]:

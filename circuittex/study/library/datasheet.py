@@ -68,6 +68,7 @@ def write_datasheet(
         cells=_cells(cells, networks),
         ratings=_ratings(study, known),
         rise=number(known.rise),
+        cooling=_cooling(study),
         warmth=_warmth(parts),
         reactances=_reactances(known, yarns),
         missing=_missing(study, known) | (NO_REACTANCE if yarns is None else {}),
@@ -76,6 +77,26 @@ def write_datasheet(
     )
     write_text(path, str(text))
     return path
+
+
+def _cooling(study: Study) -> str:
+    """How heat leaves, in words."""
+    electrical = study.design.electrical
+    ends = electrical.thermal_ends
+    how = (
+        f"have {ends:g} K/W each"
+        if not isinstance(ends, str)
+        else f"are {'insulated' if ends == 'insulated' else 'cold'}"
+    )
+    if electrical.heat_loss or electrical.emissivity:
+        h, e = electrical.heat_loss, electrical.emissivity
+        return f"Heat leaves along the yarns (h = {h:g} W/(mm2 K), emissivity {e:g}) and at their ends, which {how}."
+    if ends != "cold":
+        return f"Heat leaves at the yarn ends alone, which {how}: air would take more away."
+    return (
+        "As in the paper's model, heat leaves through the fibril ends alone, all of which stay as cool as the "
+        "surroundings: air would take more away, and warm ends less."
+    )
 
 
 def _missing(study: Study, known: Facts) -> dict[str, str]:

@@ -15,7 +15,7 @@ from circuittex.contact.closest import Fibrils, Found, find_contacts
 from circuittex.contact.conductance import check_laws
 from circuittex.contact.curve import CurveTable, curve_table, curve_through
 from circuittex.contact.hull import QUARTER, hulls
-from circuittex.contact.kernels import Rows, Sums, Touches, add_contacts
+from circuittex.contact.kernels import Rows, Sums, Touches, add_contacts, add_forces
 from circuittex.contact.law import pair_penalty
 from circuittex.contact.passing import PRESSED, likely_cause, safe_step
 from circuittex.contact.search import CONTROL_MOTION, Candidates, bent_back, coupled_nodes, find_candidates
@@ -186,12 +186,12 @@ class PenaltyContact:
             raise PenetrationError(f"{what}; {likely_cause(mesh, self.law, *step.fibrils, self.modulus)}")
         return step.fraction
 
-    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
-        """Add gradient and tangent in place, the turning of the contact force to `softening`; return the energy."""
-        found, table = self.touching(q), self.table
+    def _touches(self, found: Touching) -> Touches:
+        """The contact points as compiled functions take them."""
+        table = self.table
         last = table.first_interval[found.fibril_b + 1] - table.first_interval[found.fibril_b]
         k = np.minimum(found.position_b.astype(np.int64), last - 1)
-        touches = Touches(
+        return Touches(
             interval_a=found.interval_a,
             t_a=found.t_a,
             interval_b=table.first_interval[found.fibril_b] + k,
@@ -200,10 +200,22 @@ class PenaltyContact:
             overlap=found.overlap,
             stiffness=self._stiffness(found),
         )
-        shares = self._shares(table.window[touches.interval_a], table.window[touches.interval_b])
+
+    def add_gradient(self, q: Floats, gradient: Floats) -> float:
+        """Add the gradient in place; return the energy."""
+        found = self.touching(q)
+        touches = self._touches(found)
+        add_forces(curve_through(self.table, self.positions(q)), touches, gradient)
+        return float(0.5 * np.sum(touches.stiffness * found.overlap**2))
+
+    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
+        """Add gradient and tangent in place, the turning of the contact force to `softening`; return the energy."""
+        found = self.touching(q)
+        touches = self._touches(found)
+        shares = self._shares(self.table.window[touches.interval_a], self.table.window[touches.interval_b])
         rows = Rows(pattern.indptr, pattern.neighbour_start, pattern.neighbour, pattern.point_offset)
         sums = Sums(gradient, data, softening)
-        side_by_side(add_contacts, shares, curve_through(table, self.positions(q)), touches, rows, sums)
+        side_by_side(add_contacts, shares, curve_through(self.table, self.positions(q)), touches, rows, sums)
         return float(0.5 * np.sum(touches.stiffness * found.overlap**2))
 
     def _shares(self, window_a: Ints, window_b: Ints) -> list[int]:

@@ -29,6 +29,9 @@ from circuittex.relaxation.units import PLAIN, Units, own_units
 ROUGHLY = 1e-3
 """Tolerance of a descent with softer contacts than there are, which only leads near a minimum."""
 
+WORTH_A_DESCENT = 60_000
+"""Unknowns from which on a first relaxation begins with a descent by gradients."""
+
 
 @frozen
 class Equilibrium:
@@ -118,6 +121,9 @@ def _relaxed(
     scales = fibril_scales(space, design.weave.least_pitch, largest_penalty(mesh, design.contact))
     scales = replace(scales, newtons=units.force)
 
+    large = before is None and space.n_dofs >= WORTH_A_DESCENT
+    stride = float(mesh.radius.min()) if large else 0.0
+
     def descend(q: Floats, part: float, may_creep: bool) -> Minimum:
         contact.part, true = part, part == 1.0
         return minimise(
@@ -131,6 +137,7 @@ def _relaxed(
             force_tolerance=numerics.force_tolerance if true else 0.0,
             max_iterations=numerics.max_iterations,
             may_creep=may_creep,
+            stride=stride,
             report=report,
         )
 

@@ -28,8 +28,10 @@ LASTS = 60
 """Iterations after which the factor is renewed."""
 SOFTENING, SHIFT, LARGEST_SHIFT = 0.3, 0.1, 1e3
 """Of the factor: as much of the softening counts, with the first shift of 0.1, 0.4, 1.6, ... that makes it positive."""
-ARMIJO, HALVINGS = 1e-4, 10
-"""A step must achieve this part of the decrease that the slope promises, halved at most so many times."""
+ARMIJO, TRIALS = 1e-4, 10
+"""A step must achieve this part of the decrease that the slope promises, shortened at most so many times."""
+LEAST_CUT = 0.1
+"""Part of a step that failed which the next is at least."""
 CURVED = 0.1
 """Part of its slope by which a step must have changed it for its pair to be kept."""
 MOST_ITERATIONS = 1500
@@ -54,7 +56,7 @@ def descend(
     scales, free = system.scales, np.ones(system.n)
     free[system.fixed] = 0.0
     pairs: Pairs = deque(maxlen=REMEMBERED)
-    solve, age = None, 0
+    solve, age, most = None, 0, stride
     for iteration in range(MOST_ITERATIONS):
         if solve is None or age >= LASTS:
             _, energy, gradient = system.assemble(q)
@@ -69,15 +71,17 @@ def descend(
             return q, iteration
         direction = _direction(solve, pairs, force)
         try:
-            step, lower, steeper = _search(system, q, direction, energy, force, stride)
+            step, first, lower, steeper = _search(system, q, direction, energy, force, most)
         except PenetrationError:
             return q, iteration
         if step == 0.0:
             if age == 0 and not pairs:
                 return q, iteration
             pairs.clear()
-            solve = None
+            solve, most = None, stride
             continue
+        moved = step * _longest(direction)
+        most = min(stride, 2 * max(most, moved)) if step == first else moved
         change, turned = step * direction, free * (steeper - gradient)
         curvature = _dot(change, turned)
         if curvature > -CURVED * step * _dot(force, direction):
@@ -111,20 +115,29 @@ def _direction(solve: Solve, pairs: Pairs, force: Floats) -> Floats:
 
 def _search(
     system: System, q: Floats, direction: Floats, energy: float, force: Floats, stride: float
-) -> tuple[float, float, Floats]:
-    """A safe step that lowers the potential enough, with potential and gradient there; 0 if there is none."""
-    slope, motion = _dot(force, direction), direction.reshape(-1, DOFS)[:, :3]
+) -> tuple[float, float, float, Floats]:
+    """A safe step that lowers the potential enough, the first one tried, and potential and gradient there; the step is
+    0 if there is none."""
+    slope = _dot(force, direction)
     if not slope < 0.0:
-        return 0.0, energy, force
-    step = min(1.0, stride / float(np.sqrt((motion**2).sum(axis=1).max())))
+        return 0.0, 0.0, energy, force
+    step = first = min(1.0, stride / _longest(direction))
     longest = step * system.longest(q, step * direction)
-    for _ in range(HALVINGS):
+    for _ in range(TRIALS):
         if step <= longest:
             lower, steeper = system.slope(q + step * direction)
             if lower <= energy + ARMIJO * step * slope:
-                return step, lower, steeper
+                return step, first, lower, steeper
+            if np.isfinite(lower):  # the lowest point of the parabola through what is known
+                step *= max(LEAST_CUT, -0.5 * step * slope / (lower - energy - step * slope))
+                continue
         step /= 2
-    return 0.0, energy, force
+    return 0.0, first, energy, force
+
+
+def _longest(direction: Floats) -> float:
+    """The largest motion of a node, mm."""
+    return float(np.sqrt((direction.reshape(-1, DOFS)[:, :3] ** 2).sum(axis=1).max()))
 
 
 def _dot(a: Floats, b: Floats) -> float:

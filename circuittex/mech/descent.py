@@ -2,9 +2,10 @@
 
 L-BFGS (Nocedal & Wright, 7.2) keeps the last pairs s = q' - q, y = g' - g and applies to a gradient an approximate
 inverse of the tangent that satisfies the secant equation for them; what it starts from is the factor of the tangent
-made positive at the last renewal. An iteration is a solution, a gradient or two and a look for collisions, where one of
-Newton's is an assembly, a pattern and one factor or several; and far from equilibrium, where contacts come and go, the
-exact tangent of a place says little of the next.
+made positive at the last renewal. The longest motion of a node is remembered from step to step, since a step that had
+to be shortened is followed by others: that saves a gradient in each iteration. An iteration is a solution, a gradient
+or two and a look for collisions, where one of Newton's is an assembly, a pattern and one factor or several; and far
+from equilibrium, where contacts come and go, the exact tangent of a place says little of the next.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ LEAST_CUT = 0.1
 CURVED = 0.1
 """Part of its slope by which a step must have changed it for its pair to be kept."""
 MOST_ITERATIONS = 1500
-"""Cells of 64 to 1,024 crossings took 300 to 600."""
+"""Cells of 16 and 64 crossings took 195 and 423."""
 
 
 def descend(

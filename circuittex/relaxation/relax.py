@@ -30,7 +30,9 @@ ROUGHLY = 1e-3
 """Tolerance of a descent with softer contacts than there are, which only leads near a minimum."""
 
 WORTH_A_DESCENT = 60_000
-"""Unknowns from which on a first relaxation begins with a descent by gradients."""
+"""Unknowns from which on a first relaxation begins with a descent by gradients. With 29,520 of them, 4 x 4 yarns of ten
+fibrils, it costs as much as Newton's method alone, with 116,640, 8 x 8 yarns, a little over half
+(`benchmarks/size.py`)."""
 
 
 @frozen
@@ -47,8 +49,8 @@ class Equilibrium:
     residual: float
     """Largest free force, N; moments on directors over half a pitch."""
     iterations: int
-    """Linear systems solved: Newton iterations, and one for the prediction where there was one; of all descents, where
-    softer contacts came first (`continued`)."""
+    """Linear systems solved: iterations by gradients and of Newton's method, and one for the prediction where there was
+    one; of all descents, where softer contacts came first (`continued`)."""
     history: Floats
     """(Newton iterations + 1, 4) residual N, potential N mm, shift (`minimise`), step length, of the last descent."""
 

@@ -18,7 +18,7 @@ import numpy as np
 from circuittex.base.arrays import Floats
 from circuittex.base.errors import PenetrationError
 from circuittex.mech.linear import LinearSolver, Solve
-from circuittex.mech.pattern import DOFS
+from circuittex.mech.pattern import DOFS, Pattern, diagonal
 from circuittex.mech.system import System
 
 Pairs = deque[tuple[Floats, Floats, float]]
@@ -28,7 +28,8 @@ REMEMBERED = 20
 LASTS = 60
 """Iterations after which the factor is renewed."""
 SOFTENING, SHIFT, LARGEST_SHIFT = 0.3, 0.1, 1e3
-"""Of the factor: as much of the softening counts, with the first shift of 0.1, 0.4, 1.6, ... that makes it positive."""
+"""Of the factor: as much of the softening counts, with the first shift of 0.1, 0.4, 1.6, ... that makes it positive.
+The largest is in parts of the largest stiffness of an unknown over its metric, as Newton's is."""
 ARMIJO, TRIALS = 1e-4, 10
 """A step must achieve this part of the decrease that the slope promises, shortened at most so many times."""
 LEAST_CUT = 0.1
@@ -60,8 +61,8 @@ def descend(
     solve, age, most = None, 0, stride
     for iteration in range(MOST_ITERATIONS):
         if solve is None or age >= LASTS:
-            _, energy, gradient = system.assemble(q)
-            solve, age, allowed = _factor(system, solver), 0, system.limits(q, *limits)
+            pattern, energy, gradient = system.assemble(q)
+            solve, age, allowed = _factor(system, solver, pattern, free), 0, system.limits(q, *limits)
             if solve is None or not np.isfinite(energy):
                 return q, iteration
         force = free * gradient
@@ -91,9 +92,10 @@ def descend(
     return q, MOST_ITERATIONS
 
 
-def _factor(system: System, solver: LinearSolver) -> Solve | None:
-    shift = SHIFT
-    while shift <= LARGEST_SHIFT:
+def _factor(system: System, solver: LinearSolver, pattern: Pattern, free: Floats) -> Solve | None:
+    stiffness, metric = (values[diagonal(pattern)] for values in (system.data, system.metric))
+    shift, largest = SHIFT, LARGEST_SHIFT * float((free * stiffness / metric).max())
+    while shift <= largest:
         solve = system.factor(solver, shift, SOFTENING)
         if solve is not None:
             return solve

@@ -88,6 +88,12 @@ class WatchedTerm:
         self.watch.add(self.parts[1], clock)
         return energy
 
+    def add_gradient(self, q: Floats, gradient: Floats) -> float:
+        clock = time.perf_counter()
+        energy = self.term.add_gradient(q, gradient)
+        self.watch.add(self.parts[1], clock)
+        return energy
+
     def longest(self, q: Floats, direction: Floats) -> float:
         clock = time.perf_counter()
         part = self.term.longest(q, direction)

@@ -78,6 +78,10 @@ class DeadLoad:
     def energy(self, q: Floats) -> float:
         return float(-self.force @ q)
 
+    def add_gradient(self, q: Floats, gradient: Floats) -> float:
+        gradient -= self.force
+        return self.energy(q)
+
     def longest(self, q: Floats, direction: Floats) -> float:
         return 1.0
 

@@ -33,6 +33,7 @@ SCRIPTS = [
     "panel",
     "paper_tables",
     "scaling",
+    "size",
     "table",
 ]
 ROUND_OFF = 1e-12
@@ -247,6 +248,17 @@ def test_every_section_of_the_page_is_a_benchmark_with_results() -> None:
     sections = [match["name"] for match in table.SECTION.finditer(table.PAGE.read_text())]
     assert sorted(sections) == sorted(path.stem for path in table.MEASURED.glob("*.json"))
     assert table.rewritten(table.PAGE.read_text(), table.MEASURED) == table.PAGE.read_text()
+
+
+def test_size_measures_both_ways_and_compares_sizes() -> None:
+    size = script("size")
+    found = [size.measured(way, 1, 3, 4) for way in size.WAYS]
+    assert [result["cheap"] > 0 for result in found] == [False, True]
+    table = size.table(
+        [found[1], {**found[1], "unknowns": 2 * found[1]["unknowns"], "seconds": 2 * found[1]["seconds"]}]
+    )
+    assert len(table.rows[0]) == len(size.HEAD)
+    assert table.rows[1][-2] == pytest.approx(1.0)
 
 
 def test_scaling_measures_a_size_and_compares_two() -> None:

@@ -16,10 +16,11 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.mech.linear import Solve
-from circuittex.mech.minimise import System, predict
+from circuittex.mech.minimise import predict
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import Pattern
 from circuittex.mech.scales import fibril_scales
+from circuittex.mech.system import System
 from circuittex.relaxation.relax import Equilibrium, clamp_force, force_terms, move, relax
 
 TIGHT = 1e-9  # N; clamp forces are some 0.1 N, so that results agree to 1e-7 and better

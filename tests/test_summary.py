@@ -105,7 +105,7 @@ def test_what_the_equilibria_took_is_said() -> None:
     first, second, third = STUDY.records
     study = replace(STUDY, records=(first, replace(second, residual=7e-7), replace(third, parts=4, iterations=90)))
     assert effort(study) == (
-        "3 equilibria in 156 Newton iterations, at most 90 for one; the largest free force is 7.0e-07 N in "
+        "3 equilibria in 156 iterations, at most 90 for one; the largest free force is 7.0e-07 N in "
         "stretch-0.0250 (2e-05 of the forces on its fibril is allowed).",
         "Increments too large to converge as a whole were halved: stretch-0.0500 in 4 parts.",
     )

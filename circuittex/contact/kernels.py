@@ -181,3 +181,26 @@ def _add(
                 for m in range(3):
                     sums.data[row + m] += cc * pair.spread[k, m]
                     sums.softening[row + m] += cc * pair.turned[k, m] + wk * w[j, m]
+
+
+@compiled
+def add_forces(curve: Any, touches: Any, gradient: Any) -> None:
+    """Add the contacts' gradient alone, -P w_q o c_i n, to gradient (n_dofs,), in their order."""
+    r, mine, other, u = curve.r, np.empty(4), np.empty(4), np.empty(3)
+    for q in range(touches.overlap.shape[0]):
+        a, b = touches.interval_a[q], touches.interval_b[q]
+        weights(curve.basis[curve.kind[a]], touches.t_a[q], 0, mine)
+        weights(curve.basis[curve.kind[b]], touches.t_b[q], 0, other)
+        wa, wb, square = curve.window[a], curve.window[b], 0.0
+        for k in range(3):
+            u[k] = 0.0
+            for i in range(4):
+                u[k] += mine[i] * r[wa + i, k]
+            for i in range(4):
+                u[k] -= other[i] * r[wb + i, k]
+            square += u[k] * u[k]
+        force = touches.stiffness[q] * touches.overlap[q] / np.sqrt(square)
+        for i in range(4):
+            for k in range(3):
+                gradient[9 * (wa + i) + k] -= force * mine[i] * u[k]
+                gradient[9 * (wb + i) + k] += force * other[i] * u[k]

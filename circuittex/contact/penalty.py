@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +17,7 @@ from circuittex.contact.closest import Fibrils, Found, find_contacts
 from circuittex.contact.conductance import check_laws
 from circuittex.contact.curve import CurveTable, curve_table, curve_through
 from circuittex.contact.hull import QUARTER, hulls
-from circuittex.contact.kernels import Rows, Sums, Touches, add_contacts
+from circuittex.contact.kernels import Rows, Sums, Touches, add_contacts, add_forces
 from circuittex.contact.law import pair_penalty
 from circuittex.contact.passing import PRESSED, likely_cause, safe_step
 from circuittex.contact.search import CONTROL_MOTION, Candidates, bent_back, coupled_nodes, find_candidates
@@ -28,6 +30,9 @@ WORTH_A_THREAD = 2000
 SKIN = 8 / 15
 """How far candidates reach beyond touch, in parts of the smallest radius: they last for as long as nothing moves by
 about a quarter of it."""
+WANDER = 4
+"""How much further candidates reach where only forces are asked for: no pattern needs room for them, most are
+refused at a glance, and they last for as long as nothing moves by R or so."""
 LIKELY = 2 / 3 * QUARTER
 """Where a fibril turns by as much on its way from one stretch of it to another, the pattern has room for their contact:
 it can come only once that has become a quarter."""
@@ -67,6 +72,14 @@ def contact_points(mesh: FibrilMesh, per_element: int) -> Floats:
     return table
 
 
+def _lasts(known: tuple[Candidates, Floats] | None, r: Floats, skin: float) -> TypeGuard[tuple[Candidates, Floats]]:
+    """Whether since a search no Bézier point moved by half its skin."""
+    if known is None:
+        return False
+    moved = float(np.sqrt(((r - known[1]) ** 2).sum(axis=1).max()))
+    return CONTROL_MOTION * moved <= skin / 2
+
+
 class PenaltyContact:
     """Energy sum over contact points of 1/2 P* w o^2; both fibrils of a pair carry points, with half weight.
 
@@ -95,6 +108,8 @@ class PenaltyContact:
         """What the pattern has room for, and the nodes (N, 3) for which it was searched."""
         self._tried: tuple[Candidates, Floats] | None = None
         """The same for a trial outside the reach of what is held."""
+        self._wide: tuple[Candidates, Floats] | None = None
+        """The same for gradients alone, with `WANDER` times the skin."""
         self._own: NDArray[np.bool_] = np.empty(0, dtype=np.bool_)
         """(rows,) the stretches of its own fibril that the pattern has room for, of those held."""
         self._last: tuple[Floats, Touching] | None = None
@@ -116,12 +131,16 @@ class PenaltyContact:
     def _near(self, r: Floats) -> tuple[Candidates, Floats]:
         """Candidates that hold every pair in touch at r: since their search no Bézier point moved by half the skin."""
         for known in (self._held, self._tried):
-            if known is not None:
-                moved = float(np.sqrt(((r - known[1]) ** 2).sum(axis=1).max()))
-                if CONTROL_MOTION * moved <= self.skin / 2:
-                    return known
+            if _lasts(known, r, self.skin):
+                return known
         self._tried = find_candidates(self.table, r, self.mesh.radius, self.skin), r
         return self._tried
+
+    def _around(self, r: Floats) -> tuple[Candidates, Floats]:
+        """The same, from a search further around."""
+        if not _lasts(self._wide, r, WANDER * self.skin):
+            self._wide = find_candidates(self.table, r, self.mesh.radius, WANDER * self.skin), r
+        return self._wide
 
     def pairs(self) -> tuple[Ints, Ints]:
         """Node pairs that the present candidates can couple, positions only."""
@@ -132,8 +151,11 @@ class PenaltyContact:
         """All contact points that overlap at q; candidates are searched for it if q lies outside their reach."""
         if self._last is not None and np.array_equal(self._last[0], q):
             return self._last[1]
+        return self._touching(q, self._near)
+
+    def _touching(self, q: Floats, near: Callable[[Floats], tuple[Candidates, Floats]]) -> Touching:
         r = self.positions(q)
-        found = self._search(self._near(r)[0], r)
+        found = self._search(near(r)[0], r)
         self._last = q.copy(), found
         return found
 
@@ -186,12 +208,12 @@ class PenaltyContact:
             raise PenetrationError(f"{what}; {likely_cause(mesh, self.law, *step.fibrils, self.modulus)}")
         return step.fraction
 
-    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
-        """Add gradient and tangent in place, the turning of the contact force to `softening`; return the energy."""
-        found, table = self.touching(q), self.table
+    def _touches(self, found: Touching) -> Touches:
+        """The contact points as compiled functions take them."""
+        table = self.table
         last = table.first_interval[found.fibril_b + 1] - table.first_interval[found.fibril_b]
         k = np.minimum(found.position_b.astype(np.int64), last - 1)
-        touches = Touches(
+        return Touches(
             interval_a=found.interval_a,
             t_a=found.t_a,
             interval_b=table.first_interval[found.fibril_b] + k,
@@ -200,10 +222,22 @@ class PenaltyContact:
             overlap=found.overlap,
             stiffness=self._stiffness(found),
         )
-        shares = self._shares(table.window[touches.interval_a], table.window[touches.interval_b])
+
+    def add_gradient(self, q: Floats, gradient: Floats) -> float:
+        """Add the gradient in place; return the energy."""
+        found = self._touching(q, self._around)
+        touches = self._touches(found)
+        add_forces(curve_through(self.table, self.positions(q)), touches, gradient)
+        return float(0.5 * np.sum(touches.stiffness * found.overlap**2))
+
+    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
+        """Add gradient and tangent in place, the turning of the contact force to `softening`; return the energy."""
+        found = self.touching(q)
+        touches = self._touches(found)
+        shares = self._shares(self.table.window[touches.interval_a], self.table.window[touches.interval_b])
         rows = Rows(pattern.indptr, pattern.neighbour_start, pattern.neighbour, pattern.point_offset)
         sums = Sums(gradient, data, softening)
-        side_by_side(add_contacts, shares, curve_through(table, self.positions(q)), touches, rows, sums)
+        side_by_side(add_contacts, shares, curve_through(self.table, self.positions(q)), touches, rows, sums)
         return float(0.5 * np.sum(touches.stiffness * found.overlap**2))
 
     def _shares(self, window_a: Ints, window_b: Ints) -> list[int]:

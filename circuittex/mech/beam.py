@@ -16,7 +16,7 @@ from circuittex.mech.pattern import DOFS, Pattern
 from circuittex.mech.scales import line_matrix
 from circuittex.mech.section import disk_rule
 from circuittex.mech.space import BeamSpace
-from circuittex.mech.tangent import Sums, add_tangent
+from circuittex.mech.tangent import Sums, add_gradient, add_tangent
 
 WORTH_A_THREAD = 200
 """Elements whose assembly takes several times as long as it takes to start a thread."""
@@ -105,6 +105,12 @@ class Beam:
         """Elastic energy, N mm; infinite where a section has turned inside out."""
         energy = np.empty(len(self.stiffness))
         self._by_fibrils(beam_energy, q.reshape(-1, DOFS), self.elements, energy)
+        return float(energy.sum())
+
+    def add_gradient(self, q: Floats, gradient: Floats) -> float:
+        """Add the gradient in place; return the energy."""
+        energy = np.empty(len(self.stiffness))
+        self._by_fibrils(add_gradient, q.reshape(-1, DOFS), self.elements, self.stiffness, energy, gradient)
         return float(energy.sum())
 
     def longest(self, q: Floats, direction: Floats) -> float:

@@ -129,6 +129,11 @@ class Inertia:
         inertia, drag = self._forces(q)
         return float(0.5 * ((q - self._coast) @ inertia + (q - self._from) @ drag))
 
+    def add_gradient(self, q: Floats, gradient: Floats) -> float:
+        """Add the gradient in place; return the incremental potential."""
+        gradient += self.gradient(q)
+        return self.energy(q)
+
     def longest(self, q: Floats, direction: Floats) -> float:
         """1: inertia and damping bar no way."""
         return 1.0

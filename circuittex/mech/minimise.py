@@ -11,19 +11,18 @@ what is much or little the `Scales` say: all numbers below are pure ones.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats, Ints
-from circuittex.base.compiled import compiled
 from circuittex.base.errors import ConvergenceError, CreepingError, PenetrationError
 from circuittex.base.frozen import frozen
+from circuittex.mech.descent import descend
 from circuittex.mech.linear import LinearSolver, Solve
-from circuittex.mech.pattern import DOFS, Pattern, build_pattern, diagonal, multiply
+from circuittex.mech.pattern import Pattern, diagonal, multiply
 from circuittex.mech.scales import Scales
+from circuittex.mech.system import System
 from circuittex.mech.terms import ForceTerm
 
 FIRST_SHIFT, LEAST_SHIFT = 1.0, 1e-3
@@ -52,8 +51,6 @@ UNSEEN = 100 * ROUND_OFF
 """A step that promises less than this part of the potential cannot be judged by it. The shift is FIRST_SHIFT then,
 still a hundred times softer than the softest bending mode: with less, the round-off of its forces would turn a fibril
 that nothing holds, and to second order stretch it."""
-ROUNDED = 16 * float(np.finfo(float).eps)
-"""Part of stiffness times coordinate that is round-off of a force: where nothing else acts, as little is none."""
 SHORT, CREEPING = 1 / 32, 5
 """A descent creeps once it has taken as many steps as short as that, or one where it does not arrive at all. In the
 paper's cell no step is below 1/8; cells of mixed moduli were seen to arrive within 25 iterations in spite of three."""
@@ -75,88 +72,10 @@ class Minimum:
     residual: float
     """Largest magnitude of the gradient on the free unknowns, N; moments on directors over the lever."""
     iterations: int
-    """Linear systems solved: Newton iterations, and one for the prediction where there was one."""
+    """Linear systems solved: iterations of the descent by gradients and of Newton's method, and one for the prediction
+    where there was one."""
     history: Floats
     """(Newton iterations + 1, 4) residual N, potential N mm, shift, step length of each."""
-
-
-@dataclass
-class System:
-    """Pattern, metric and the values assembled in it; renewed when a term's couplings change."""
-
-    terms: Sequence[ForceTerm]
-    scales: Scales
-    fixed: Ints
-    n: int
-    pattern: Pattern | None = None
-    metric: Floats = field(default_factory=lambda: np.empty(0))
-    scaling: Floats = field(default_factory=lambda: np.empty(0))
-    data: Floats = field(default_factory=lambda: np.empty(0))
-    softening: Floats = field(default_factory=lambda: np.empty(0))
-    forces: Floats = field(default_factory=lambda: np.empty(0))
-    largest_shift: float = 0.0
-    held: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-
-    def assemble(self, q: Floats) -> tuple[Pattern, float, Floats]:
-        changed = [term.prepare(q) for term in self.terms]
-        if self.pattern is None or any(changed):
-            self.pattern = self._renewed(q)
-        gradient, self.data, self.softening = np.zeros(self.n), np.zeros(self.pattern.nnz), np.zeros(self.pattern.nnz)
-        self.forces, energy = np.zeros(len(self.scales.first_node) - 1), 0.0
-        for term in self.terms:
-            others = gradient.copy()
-            energy += term.assemble(q, self.pattern, gradient, self.data, self.softening)
-            self.forces = np.maximum(self.forces, self.scales.forces(gradient - others))
-        return self.pattern, energy, gradient
-
-    def _renewed(self, q: Floats) -> Pattern:
-        pairs = [term.pairs() for term in self.terms]
-        full, point = (np.concatenate([p[k] for p in pairs]) for k in (0, 1))
-        pattern = build_pattern(self.n // DOFS, full, point, q.reshape(-1, DOFS)[:, :3].copy())
-        self.metric = self.scales.metric(pattern)
-        rows = np.repeat(np.arange(self.n), np.diff(pattern.indptr))
-        unit = self.scales.binary_unit
-        self.scaling = unit[rows] * unit[pattern.indices] / self.scales.energy
-        is_fixed = np.zeros(self.n, dtype=bool)
-        is_fixed[self.fixed] = True
-        self.held = np.flatnonzero(is_fixed[rows] | is_fixed[pattern.indices])
-        return pattern
-
-    def factor(self, solver: LinearSolver, shift: float, softening: float) -> Solve | None:
-        """The shifted tangent's factor, None where it is not positive definite.
-
-        Its roots would be rounded otherwise at another scale, so what is factorised has no unit.
-        """
-        assert self.pattern is not None
-        values = np.empty(self.pattern.nnz)
-        _shifted(self.data, softening, self.softening, shift, self.metric, self.scaling, values)
-        values[self.held] = 0.0
-        values[diagonal(self.pattern)[self.fixed]] = 1.0
-        solve, unit, energy = solver.factor(self.pattern, values), self.scales.binary_unit, self.scales.energy
-        return None if solve is None else lambda force: unit * solve(unit * force / energy)
-
-    def limits(self, q: Floats, tolerance: float, force_tolerance: float) -> Floats:
-        """(F,) the free force, N, up to which each fibril is in equilibrium: see `minimise`."""
-        if tolerance == 0.0:
-            return np.full_like(self.forces, force_tolerance)
-        assert self.pattern is not None
-        stiffness = self.data[diagonal(self.pattern)].reshape(-1, DOFS)[:, :3].max(axis=1)
-        rounded = ROUNDED * stiffness * np.abs(q).reshape(-1, DOFS)[:, :3].max(axis=1)
-        own = tolerance * np.minimum(self.forces, self.scales.largest_force)
-        return np.maximum(own, np.maximum(self.scales.over_fibrils(rounded), force_tolerance))
-
-    def energy(self, q: Floats) -> float:
-        return sum(term.energy(q) for term in self.terms)
-
-    def longest(self, q: Floats, direction: Floats) -> float:
-        return min(term.longest(q, direction) for term in self.terms)
-
-
-@compiled
-def _shifted(data: Any, fraction: float, softening: Any, shift: float, metric: Any, scaling: Any, values: Any) -> None:
-    """Fill values (nnz,) with (data + fraction softening + shift metric) scaling."""
-    for k in range(values.shape[0]):
-        values[k] = (data[k] + fraction * softening[k] + shift * metric[k]) * scaling[k]
 
 
 def minimise(
@@ -171,6 +90,7 @@ def minimise(
     force_tolerance: float = 0.0,
     max_iterations: int = 200,
     may_creep: bool = True,
+    stride: float = 0.0,
     report: Callable[[int, float], None] | None = None,
 ) -> Minimum:
     """The minimum of the terms' total potential that a descent from q (n_dofs,) reaches.
@@ -182,6 +102,9 @@ def minimise(
     acts on a node of it, or round-off does; `force_tolerance` (N) does so where that allows more, or alone where the
     other is 0.
 
+    Where `stride` (mm) is not zero, a descent by gradients alone comes first (`descend`), none of whose steps moves a
+    node by more: many iterations, each a fraction of one of Newton's.
+
     Raises `ConvergenceError`, with the history, where that is not met at a minimum in `max_iterations`: an
     unconverged state is never returned. `CreepingError` where its steps are short and it may not creep,
     `PenetrationError` where a term cannot keep apart what it should.
@@ -192,6 +115,9 @@ def minimise(
     shift, place, refused, step, history = FIRST_SHIFT, 0, False, 1.0, []
     free_dofs = np.ones(len(q), dtype=bool)
     free_dofs[fixed] = False
+    cheap = 0
+    if stride > 0.0:
+        q, cheap = descend(system, solver, q, stride=stride, limits=(tolerance, force_tolerance), report=report)
     for iteration in range(max_iterations + 1):
         pattern, energy, gradient = system.assemble(q)
         if iteration == 0:
@@ -201,12 +127,12 @@ def minimise(
         residual, limits = float(left.max()), system.limits(q, tolerance, force_tolerance)
         history.append((residual, energy, shift, step))
         if report is not None:
-            report(iteration, scales.newtons * residual)
+            report(cheap + iteration, scales.newtons * residual)
         if not np.isfinite(energy):
             raise ConvergenceError("the potential is infinite: a fibril's section is inside out", np.array(history))
         balanced = bool((left <= limits).all())
         if balanced and system.factor(solver, FIRST_SHIFT, 1.0) is not None:
-            solves = iteration + (before is not None)
+            solves = cheap + iteration + (before is not None)
             return Minimum(q, gradient, energy, residual, solves, np.array(history))
         short, last = sum(row[3] <= SHORT for row in history), iteration == max_iterations
         if not may_creep and short >= (1 if last else CREEPING):

@@ -84,6 +84,14 @@ def _spread(stiffness: Any, C: Any, K: Any) -> None:
 
 
 @compiled
+def _pulled(p: Any, V: Any, g: Any) -> None:
+    """Add p V to the gradient g (WIDTH,)."""
+    p0, p1, p2, v0, v1, v2 = p[0], p[1], p[2], V[0], V[1], V[2]
+    for m in range(WIDTH):
+        g[m] += p0 * v0[m] + p1 * v1[m] + p2 * v2[m]
+
+
+@compiled
 def _weighted(p: Any, A: Any, V: Any, W: Any, g: Any) -> None:
     """Fill W (3, WIDTH) with A V and add p V to the gradient g (WIDTH,)."""
     p0, p1, p2, v0, v1, v2 = p[0], p[1], p[2], V[0], V[1], V[2]
@@ -168,3 +176,25 @@ def add_tangent(first: int, last: int, x: Any, elements: Any, stiffness: Any, ou
         _products(V, W, K)
         _add_gradient(nodes[e], x, stiffness[e], g, gradient)
         _add_tangent(nodes[e], K, indptr, data)
+
+
+@compiled
+def add_gradient(first: int, last: int, x: Any, elements: Any, stiffness: Any, out: Any, gradient: Any) -> None:
+    """Add the gradient of elements first to last alone; fill out (M,) with their energies, N mm (`add_tangent`)."""
+    nodes, shape, slope, weight, points, natural, metric, mu, lam = elements
+    u, normal, j, scratch = np.empty((N_STRAINS, 3)), np.empty(3), np.empty(3), np.empty((4, weight.shape[2]))
+    d, p, A = np.empty((N_STRAINS, N_STRAINS)), np.empty(3), np.empty((3, 3))
+    V, g = np.zeros((3, WIDTH)), np.empty(WIDTH)
+    for e in range(first, last):
+        block, shaped = min(e, points.shape[0] - 1), min(e, natural.shape[0] - 1)
+        out[e], g[:] = 0.0, 0.0
+        for q in range(shape.shape[0]):
+            strains(nodes[e], x, shape[q], slope[e, q], u, normal)
+            if not section(u, normal, natural[shaped, q], metric[shaped, q], points[block], d, j, scratch):
+                out[e] = np.inf
+                continue
+            out[e] += energy(weight[e, q], mu[e], lam[e], scratch)
+            moments(weight[e, q], points[block], mu[e], lam[e], scratch, p, A)
+            _volume_slopes(u, normal, shape[q], slope[e, q], V)
+            _pulled(p, V, g)
+        _add_gradient(nodes[e], x, stiffness[e], g, gradient)

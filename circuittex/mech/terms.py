@@ -20,6 +20,9 @@ class ForceTerm(Protocol):
     def energy(self, q: Floats) -> float:
         """The potential, N mm; infinite where q is impossible."""
 
+    def add_gradient(self, q: Floats, gradient: Floats) -> float:
+        """Add the gradient (N) alone in place; return the potential, infinite where q is impossible."""
+
     def longest(self, q: Floats, direction: Floats) -> float:
         """The part of `direction` (n_dofs,), at most 1, that can be gone from q without passing through what the
         potential forbids but does not see, as it is the same on the other side; 1 where nothing is in the way.

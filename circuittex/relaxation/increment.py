@@ -30,7 +30,7 @@ class Increment:
     parts: int
     """Parts in which it was made: 1 where it converged as a whole."""
     iterations: int
-    """Newton iterations of all parts and of the tries that did not converge."""
+    """Iterations of all parts and of the tries that did not converge."""
 
 
 def advance(

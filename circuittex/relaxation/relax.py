@@ -29,6 +29,11 @@ from circuittex.relaxation.units import PLAIN, Units, own_units
 ROUGHLY = 1e-3
 """Tolerance of a descent with softer contacts than there are, which only leads near a minimum."""
 
+WORTH_A_DESCENT = 60_000
+"""Unknowns from which on a first relaxation begins with a descent by gradients. With 29,520 of them, 4 x 4 yarns of ten
+fibrils, it costs as much as Newton's method alone, with 116,640, 8 x 8 yarns, a little over half
+(`benchmarks/size.py`)."""
+
 
 @frozen
 class Equilibrium:
@@ -44,8 +49,8 @@ class Equilibrium:
     residual: float
     """Largest free force, N; moments on directors over half a pitch."""
     iterations: int
-    """Linear systems solved: Newton iterations, and one for the prediction where there was one; of all descents, where
-    softer contacts came first (`continued`)."""
+    """Linear systems solved: iterations by gradients and of Newton's method, and one for the prediction where there was
+    one; of all descents, where softer contacts came first (`continued`)."""
     history: Floats
     """(Newton iterations + 1, 4) residual N, potential N mm, shift (`minimise`), step length, of the last descent."""
 
@@ -118,6 +123,9 @@ def _relaxed(
     scales = fibril_scales(space, design.weave.least_pitch, largest_penalty(mesh, design.contact))
     scales = replace(scales, newtons=units.force)
 
+    large = before is None and space.n_dofs >= WORTH_A_DESCENT
+    stride = float(mesh.radius.min()) if large else 0.0
+
     def descend(q: Floats, part: float, may_creep: bool) -> Minimum:
         contact.part, true = part, part == 1.0
         return minimise(
@@ -131,6 +139,7 @@ def _relaxed(
             force_tolerance=numerics.force_tolerance if true else 0.0,
             max_iterations=numerics.max_iterations,
             may_creep=may_creep,
+            stride=stride,
             report=report,
         )
 

@@ -39,7 +39,7 @@ class Record:
     residual: float
     """Largest free-dof force, N."""
     iterations: int
-    """Newton iterations spent on this state, those of tries that did not converge included."""
+    """Iterations spent on this state, those of tries that did not converge included."""
     parts: int
     """Parts into which the increment to this state was halved; 1 where it converged as a whole."""
     history: Floats

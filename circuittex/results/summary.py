@@ -203,7 +203,7 @@ def effort(study: Study) -> tuple[str, ...]:
     worst = max(study.records, key=lambda record: record.residual)
     states = "1 equilibrium" if len(iterations) == 1 else f"{len(iterations)} equilibria"
     sentences = [
-        f"{states} in {sum(iterations)} Newton iterations, at most {max(iterations)} for one; the largest free force "
+        f"{states} in {sum(iterations)} iterations, at most {max(iterations)} for one; the largest free force "
         f"is {worst.residual:.1e} N in {worst.name} ({study.design.numerics.allowed} is allowed)."
     ]
     halved = [f"{record.name} in {record.parts} parts" for record in study.records if record.parts > 1]

@@ -171,7 +171,7 @@ def _rounded(values: Floats) -> list[str]:
 
 
 def _equilibrium(study: Study) -> dict[str, Any]:
-    head = ["state", "largest free force (N)", "Newton iterations", "parts", "levels", "contact points"]
+    head = ["state", "largest free force (N)", "iterations", "parts", "levels", "contact points"]
     head += ["deepest overlap / (R + R')", "largest stress (MPa)", "netlist"]
     rows = [
         [

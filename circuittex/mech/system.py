@@ -1,0 +1,105 @@
+"""Terms, pattern and assembled values of a minimisation: what its phases share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from circuittex.base.arrays import Floats, Ints
+from circuittex.base.compiled import compiled
+from circuittex.mech.linear import LinearSolver, Solve
+from circuittex.mech.pattern import DOFS, Pattern, build_pattern, diagonal
+from circuittex.mech.scales import Scales
+from circuittex.mech.terms import ForceTerm
+
+ROUNDED = 16 * float(np.finfo(float).eps)
+"""Part of stiffness times coordinate that is round-off of a force: where nothing else acts, as little is none."""
+
+
+@dataclass
+class System:
+    """Pattern, metric and the values assembled in it; renewed when a term's couplings change."""
+
+    terms: Sequence[ForceTerm]
+    scales: Scales
+    fixed: Ints
+    n: int
+    pattern: Pattern | None = None
+    metric: Floats = field(default_factory=lambda: np.empty(0))
+    scaling: Floats = field(default_factory=lambda: np.empty(0))
+    data: Floats = field(default_factory=lambda: np.empty(0))
+    softening: Floats = field(default_factory=lambda: np.empty(0))
+    forces: Floats = field(default_factory=lambda: np.empty(0))
+    largest_shift: float = 0.0
+    held: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+
+    def assemble(self, q: Floats) -> tuple[Pattern, float, Floats]:
+        changed = [term.prepare(q) for term in self.terms]
+        if self.pattern is None or any(changed):
+            self.pattern = self._renewed(q)
+        gradient, self.data, self.softening = np.zeros(self.n), np.zeros(self.pattern.nnz), np.zeros(self.pattern.nnz)
+        self.forces, energy = np.zeros(len(self.scales.first_node) - 1), 0.0
+        for term in self.terms:
+            others = gradient.copy()
+            energy += term.assemble(q, self.pattern, gradient, self.data, self.softening)
+            self.forces = np.maximum(self.forces, self.scales.forces(gradient - others))
+        return self.pattern, energy, gradient
+
+    def _renewed(self, q: Floats) -> Pattern:
+        pairs = [term.pairs() for term in self.terms]
+        full, point = (np.concatenate([p[k] for p in pairs]) for k in (0, 1))
+        pattern = build_pattern(self.n // DOFS, full, point, q.reshape(-1, DOFS)[:, :3].copy())
+        self.metric = self.scales.metric(pattern)
+        rows = np.repeat(np.arange(self.n), np.diff(pattern.indptr))
+        unit = self.scales.binary_unit
+        self.scaling = unit[rows] * unit[pattern.indices] / self.scales.energy
+        is_fixed = np.zeros(self.n, dtype=bool)
+        is_fixed[self.fixed] = True
+        self.held = np.flatnonzero(is_fixed[rows] | is_fixed[pattern.indices])
+        return pattern
+
+    def factor(self, solver: LinearSolver, shift: float, softening: float) -> Solve | None:
+        """The shifted tangent's factor, None where it is not positive definite.
+
+        Its roots would be rounded otherwise at another scale, so what is factorised has no unit.
+        """
+        assert self.pattern is not None
+        values = np.empty(self.pattern.nnz)
+        _shifted(self.data, softening, self.softening, shift, self.metric, self.scaling, values)
+        values[self.held] = 0.0
+        values[diagonal(self.pattern)[self.fixed]] = 1.0
+        solve, unit, energy = solver.factor(self.pattern, values), self.scales.binary_unit, self.scales.energy
+        return None if solve is None else lambda force: unit * solve(unit * force / energy)
+
+    def limits(self, q: Floats, tolerance: float, force_tolerance: float) -> Floats:
+        """(F,) the free force, N, up to which each fibril is in equilibrium: see `minimise`."""
+        if tolerance == 0.0:
+            return np.full_like(self.forces, force_tolerance)
+        assert self.pattern is not None
+        stiffness = self.data[diagonal(self.pattern)].reshape(-1, DOFS)[:, :3].max(axis=1)
+        rounded = ROUNDED * stiffness * np.abs(q).reshape(-1, DOFS)[:, :3].max(axis=1)
+        own = tolerance * np.minimum(self.forces, self.scales.largest_force)
+        return np.maximum(own, np.maximum(self.scales.over_fibrils(rounded), force_tolerance))
+
+    def slope(self, q: Floats) -> tuple[float, Floats]:
+        """The potential and its gradient (n_dofs,), without the tangent."""
+        gradient, energy = np.zeros(self.n), 0.0
+        for term in self.terms:
+            energy += term.add_gradient(q, gradient)
+        return energy, gradient
+
+    def energy(self, q: Floats) -> float:
+        return sum(term.energy(q) for term in self.terms)
+
+    def longest(self, q: Floats, direction: Floats) -> float:
+        return min(term.longest(q, direction) for term in self.terms)
+
+
+@compiled
+def _shifted(data: Any, fraction: float, softening: Any, shift: float, metric: Any, scaling: Any, values: Any) -> None:
+    """Fill values (nnz,) with (data + fraction softening + shift metric) scaling."""
+    for k in range(values.shape[0]):
+        values[k] = (data[k] + fraction * softening[k] + shift * metric[k]) * scaling[k]

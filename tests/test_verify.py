@@ -18,7 +18,7 @@ from circuittex.electrical.fields import solve_fields, solve_probes
 from circuittex.electrical.network.circuit import build_circuit
 from circuittex.electrical.network.nodal import NodalSolution, solve_nodal
 from circuittex.study import verify as module
-from circuittex.study.verify import verify
+from circuittex.study.verify import _relative, verify
 
 TERMINALS = (
     Terminal("left", (("warp2", -1),)),
@@ -94,6 +94,15 @@ def test_insulated_contacts_leave_two_probes_without_current() -> None:
     assert found.ngspice_checked
     assert found.note == ""
     assert max(found.max_current_difference, found.merge_error, found.field_difference) < 1e-12
+
+
+def test_what_rounding_makes_of_no_current_is_no_difference() -> None:
+    """ngspice's 4e-16 A at a terminal without a conductor, where a yarn carries 5e-6 A, was a difference of 100 %."""
+    yarn = np.array([5e-6, 5e-6])
+    assert _relative([0.0, 1e-6], [-4e-16, 1e-6], yarn) == pytest.approx(4e-10, rel=1e-12)
+    assert _relative([0.0], [-4e-16], yarn[:1]) == pytest.approx(8e-11, rel=1e-12)
+    assert _relative([0.0], [-4e-9], yarn[:1]) == pytest.approx(8e-4, rel=1e-12)
+    assert _relative([2e-6], [1e-6], yarn[:1]) == pytest.approx(1.0, rel=1e-12)
 
 
 def test_without_probes_nothing_is_called_verified() -> None:

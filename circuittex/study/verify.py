@@ -250,8 +250,12 @@ def _yarn_currents(contacts: ContactState, probes: Sequence[Probe]) -> Floats:
 
 
 def _relative(values: Sequence[float], reference: Sequence[float], yarn: Floats) -> float:
-    """Largest difference relative to each reference or, for those that are nothing beside others, to those."""
-    scale = _scale(reference, yarn)
+    """Largest difference relative to each reference or, for those that are nothing beside others, to those.
+
+    What one of the two says is nothing may be rounding in the other, and is no reference then.
+    """
+    least: list[float] = np.minimum(np.abs(values), np.abs(reference)).tolist()
+    scale = np.where(np.array(least) > NOTHING * yarn, _scale(reference, yarn), _scale(least, yarn))
     difference = np.abs(np.asarray(values) - np.asarray(reference))
     relative = np.divide(difference, scale, out=np.where(difference > 0.0, np.inf, 0.0), where=scale > 0.0)
     return float(np.max(relative, initial=0.0))

@@ -32,6 +32,7 @@ from circuittex.design.packing import Packing
 from circuittex.design.statement import FORMAT, Design, Electrical, Numerics
 from circuittex.design.table import Table, choose, quantity
 from circuittex.design.touching import AUTO, touching_amplitude
+from circuittex.design.wave import SINE
 from circuittex.design.weave import Weave, check_draft
 from circuittex.design.yarn import Yarn
 from circuittex.design.yarn_table import conductivities, read_material, read_yarn
@@ -117,15 +118,18 @@ def _weave(value: object, yarns: Mapping[str, Yarn]) -> Weave:
     touching = table.value.get("amplitude") == AUTO
     if touching:
         table = Table({**table.value, "amplitude": 0.0}, table.field)
-    stated = Weave(draft=draft, warp=warp, weft=weft, **read(Weave, table, "draft", "warp", "weft"))
+    numbers = read(Weave, table, "draft", "warp", "weft")
+    path = numbers.pop("path", SINE)  # which wants the amplitude to be known
+    stated = Weave(draft=draft, warp=warp, weft=weft, **numbers, path=SINE if touching else path)
     if not touching:
         return stated
     if not isinstance(stated.weft_amplitude, str):
         raise refuse(
             table.at("weft_amplitude"), stated.weft_amplitude, f"amplitude = {AUTO!r} is of warp and weft alike"
         )
-    height = touching_amplitude(warp, weft, *(direction.pitch for direction in stated.directions))
-    return replace(stated, amplitude=height)
+    pitch, weft_pitch = (direction.pitch for direction in stated.directions)
+    height = touching_amplitude(warp, weft, pitch, weft_pitch, path)
+    return replace(stated, amplitude=height, path=path)
 
 
 def _with_pitches(table: Table) -> Table:

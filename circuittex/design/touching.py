@@ -9,6 +9,7 @@ import numpy as np
 
 from circuittex.base.arrays import Floats
 from circuittex.design.checks import refuse
+from circuittex.design.wave import SINE, peirce
 from circuittex.design.yarn import Yarn
 
 AUTO = "auto"
@@ -18,13 +19,15 @@ _APART = 1.001
 _PLACES, _HEIGHTS, _HALVINGS = 41, 64, 40
 
 
-def touching_amplitude(warp: Sequence[Yarn], weft: Sequence[Yarn], pitch: float, weft_pitch: float) -> float:
+def touching_amplitude(
+    warp: Sequence[Yarn], weft: Sequence[Yarn], pitch: float, weft_pitch: float, path: str = SINE
+) -> float:
     """The smallest height H (mm) of all yarn axes over the mid-plane with which warp and weft fibrils do not overlap.
 
     Near a crossing a warp fibril at y runs at z = H cos(pi s / p_weft) + z_warp, a weft fibril at x at
     z = -H cos(pi t / p_warp) + z_weft, z_warp and z_weft their places in their yarns; none of any two may come closer
     than R + R'. Fibrils beside the middle of a yarn need more height than half of both thicknesses, since the yarn
-    over them has begun to fall.
+    over them has begun to fall. With the `path` of Peirce the waves are his, about axes 2 H apart.
 
     Raises `DesignError` where no height keeps them apart.
 
@@ -36,7 +39,7 @@ def touching_amplitude(warp: Sequence[Yarn], weft: Sequence[Yarn], pitch: float,
     pairs = list(product(_distinct(warp), _distinct(weft)))
     most = min(pitch, weft_pitch)
     heights = most * np.arange(_HEIGHTS + 1) / _HEIGHTS
-    reached = next((k for k, H in enumerate(heights) if _apart(H, pairs, pitch, weft_pitch)), None)
+    reached = next((k for k, H in enumerate(heights) if _apart(H, pairs, pitch, weft_pitch, path)), None)
     if reached is None:
         raise refuse("weave.amplitude", AUTO, "the yarns are too thick for their pitch: no height keeps them apart")
     if reached == 0:
@@ -44,7 +47,7 @@ def touching_amplitude(warp: Sequence[Yarn], weft: Sequence[Yarn], pitch: float,
     low, high = heights[reached - 1], heights[reached]
     for _ in range(_HALVINGS):
         middle = (low + high) / 2.0
-        low, high = (low, middle) if _apart(middle, pairs, pitch, weft_pitch) else (middle, high)
+        low, high = (low, middle) if _apart(middle, pairs, pitch, weft_pitch, path) else (middle, high)
     return float(high)
 
 
@@ -52,25 +55,33 @@ def _distinct(yarns: Sequence[Yarn]) -> list[Yarn]:
     return list({yarn.name: yarn for yarn in yarns}.values())
 
 
-def _apart(H: float, pairs: list[tuple[Yarn, Yarn]], pitch: float, weft_pitch: float) -> bool:
+def _apart(H: float, pairs: list[tuple[Yarn, Yarn]], pitch: float, weft_pitch: float, path: str) -> bool:
     """Whether at this height the fibrils of all pairs of crossing yarns keep their distance."""
     return all(
-        _gap(H, over, under, pitch, weft_pitch) >= _APART * (over.radius + under.radius) for over, under in pairs
+        _gap(H, over, under, pitch, weft_pitch, path) >= _APART * (over.radius + under.radius) for over, under in pairs
     )
 
 
-def _gap(H: float, over: Yarn, under: Yarn, pitch: float, weft_pitch: float) -> float:
+def _gap(H: float, over: Yarn, under: Yarn, pitch: float, weft_pitch: float, path: str) -> float:
     """Smallest distance of the centre lines of a warp yarn over a weft yarn, mm."""
     (y, low), (x, high) = _rim(over, -1.0), _rim(under, 1.0)
     reach = np.linspace(-1.0, 1.0, _PLACES) * (over.radius + under.radius)
     s, t = x[:, None] + reach, y[:, None] + reach  # (weft fibrils, places), (warp fibrils, places)
     # (warp fibrils, weft fibrils, places along the warp fibril, places along the weft fibril)
-    above = low[:, None, None, None] + H * np.cos(np.pi * s / weft_pitch)[None, :, :, None]
-    below = high[None, :, None, None] - H * np.cos(np.pi * t / pitch)[:, None, None, :]
+    above = low[:, None, None, None] + H * _crest(H, s, weft_pitch, path)[None, :, :, None]
+    below = high[None, :, None, None] - H * _crest(H, t, pitch, path)[:, None, None, :]
     climb = above - below
     distance: Floats = np.sqrt(reach[:, None] ** 2 + reach**2 + climb**2)
     sides = np.sign(climb[:, :, _PLACES // 2, _PLACES // 2])  # a fibril on the wrong side is no distance away
     return float((distance.min(axis=(2, 3)) * sides).min())
+
+
+def _crest(H: float, s: Floats, spacing: float, path: str) -> Floats:
+    """Height over H at s (mm) from a crest, of a wave with its next crossing `spacing` away."""
+    if path == SINE or H == 0.0:
+        return np.asarray(np.cos(np.pi * s / spacing))
+    part = np.abs(s) / spacing
+    return peirce(spacing, H, 2.0 * H).at(np.minimum(part % 2.0, 2.0 - part % 2.0))[0]
 
 
 def _rim(yarn: Yarn, side: float) -> tuple[Floats, Floats]:

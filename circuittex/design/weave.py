@@ -8,7 +8,8 @@ from math import pi
 
 from circuittex.base.frozen import frozen, same
 from circuittex.design.checks import instances, refuse, sequence, store, whole
-from circuittex.design.declaration import check, number
+from circuittex.design.declaration import check, choice, number
+from circuittex.design.wave import PATHS, PEIRCE, SINE, Wave, cosine, peirce
 from circuittex.design.yarn import MOST_OPEN, Material, Yarn
 
 SAME = "same"
@@ -67,6 +68,16 @@ class Weave:
         metadata=number("mm", 'H of the weft; "same": as the warp', shown=SAME, at_least=0, words=(SAME,)),
     )
     """Height of a weft yarn's axis above or below the mid-plane at a crossing, mm; 'same': as that of the warp's."""
+    path: str = field(
+        default=SINE,
+        kw_only=True,
+        metadata=choice(
+            'of the yarn axes: the paper\'s "sine", or "peirce", arcs about the crossing yarns and straight pieces',
+            PATHS,
+            shown=SINE,
+        ),
+    )
+    """'sine', or 'peirce': arcs about the crossing yarns, whose axes are H + H' away, and straight pieces between."""
 
     def __post_init__(self) -> None:
         store(
@@ -119,6 +130,9 @@ class Weave:
                 raise refuse(self.key(direction, "pitch"), direction.pitch, allowed)
 
     def _check_curvature(self) -> None:
+        if self.path == PEIRCE:
+            self._check_arcs()
+            return
         # The section at a crest turns inside out where R >= radius of curvature = step^2 / (pi^2 H).
         for direction in self.directions:
             radius = max(yarn.radius for yarn in direction.yarns)
@@ -130,6 +144,29 @@ class Weave:
                     f"fibrils of radius {radius:g} mm at a pitch of {direction.step:g} mm cannot bend that far; "
                     f"it must be < {largest:.4g} mm (pitch^2 / (pi^2 radius))",
                 )
+
+    def _check_arcs(self) -> None:
+        apart, radius = self.apart, max(yarn.radius for yarn in self.yarns)
+        if not apart > radius:
+            allowed = f"axes {apart:g} mm apart: fibrils of radius {radius:g} mm cannot bend about one another"
+            raise refuse("weave.path", PEIRCE, allowed)
+        for direction in self.directions:
+            if not peirce(direction.step, direction.amplitude, apart).straight >= 0.0:
+                near = f"{direction.step:g} mm from crossing to crossing, with axes {apart:g} mm apart there"
+                allowed = f"the {direction.name} is jammed: {near}, leave its arcs no room"
+                raise refuse("weave.path", PEIRCE, allowed)
+
+    @property
+    def apart(self) -> float:
+        """Distance of the axes of two yarns at their crossing, mm."""
+        warp, weft = self.directions
+        return warp.amplitude + weft.amplitude
+
+    def wave(self, direction: Direction) -> Wave:
+        """The wave of the yarns of a direction from crossing to crossing."""
+        if self.path == SINE or direction.amplitude == 0.0:
+            return cosine
+        return peirce(direction.step, direction.amplitude, self.apart).at
 
     @property
     def directions(self) -> tuple[Direction, Direction]:

@@ -11,6 +11,7 @@ from circuittex.base.arrays import Floats, Ints
 from circuittex.base.frozen import frozen
 from circuittex.design import Weave
 from circuittex.design.packing import Packing
+from circuittex.design.wave import Wave, cosine
 from circuittex.design.yarn import PATH
 from circuittex.geometry.natural import FINER, PARTS, along_directions, equal_arcs, lessened
 from circuittex.geometry.packing import Draws, centred, draw, places_in_yarn
@@ -127,17 +128,17 @@ def _natural(path: _Path, places: int) -> tuple[Floats, Floats, Floats]:
     return t[:, ::FINER], length, np.concatenate([position[:, :, None], directors], axis=2)
 
 
-def yarn_height(u: Floats, sides: Ints) -> tuple[Floats, Floats]:
+def yarn_height(u: Floats, sides: Ints, wave: Wave = cosine) -> tuple[Floats, Floats]:
     """Height of yarn axes over their amplitude, and its derivative, at places `u` counted in crossings.
 
     Crossing j lies at u = j; `sides` (n, crossings) holds +1 (over) or -1 (under); `u` has shape (n, k).
-    Between neighbouring crossings on sides a and b the axis is a half cosine,
+    Between neighbouring crossings on sides a and b the axis is half a wave, by default a cosine,
 
         z = (a + b)/2 + (a - b)/2 cos(pi (u - j)),
 
     hence constant along a float. Before the first and after the last crossing it continues as if the next
     yarn lay on the other side, which brings it to z = 0 half a pitch further on, at the edge of the cell.
-    A 1/1 weave is the sine of the paper throughout.
+    A 1/1 weave is the sine of the paper throughout, or Peirce's geometry.
 
     >>> yarn_height(np.array([[0.0, 0.5, 1.0]]), np.array([[1, -1]]))[0].round(12) + 0.0
     array([[ 1.,  0., -1.]])
@@ -145,8 +146,8 @@ def yarn_height(u: Floats, sides: Ints) -> tuple[Floats, Floats]:
     padded = np.concatenate([-sides[:, :1], sides, -sides[:, -1:]], axis=1).astype(np.float64)
     j = np.clip(np.floor(u).astype(np.int64), -1, sides.shape[1] - 1)
     a, b = np.take_along_axis(padded, j + 1, axis=1), np.take_along_axis(padded, j + 2, axis=1)
-    phase = np.pi * (u - j)
-    return (a + b) / 2 + (a - b) / 2 * np.cos(phase), -np.pi * (a - b) / 2 * np.sin(phase)
+    height, slope = wave(u - j)
+    return (a + b) / 2 + (a - b) / 2 * height, (a - b) / 2 * slope
 
 
 def _axis_heights(weave: Weave, yarn: Ints, s: Floats) -> tuple[Floats, Floats]:
@@ -159,7 +160,7 @@ def _axis_heights(weave: Weave, yarn: Ints, s: Floats) -> tuple[Floats, Floats]:
         weave.directions, (s[:split], s[split:]), (over[yarn[:split]], -over.T[yarn[split:] - n_warp]), strict=True
     ):
         from_first: Floats = places / direction.step + (direction.crossings - 1) / 2.0
-        height, slope = yarn_height(from_first, sides)
+        height, slope = yarn_height(from_first, sides, weave.wave(direction))
         heights.append(direction.amplitude * height)
         slopes.append(direction.amplitude * (slope / direction.step))
     return np.concatenate(heights), np.concatenate(slopes)

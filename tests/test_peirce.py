@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import fsolve
+from scipy.optimize import brentq, fsolve
 
 from circuittex.base.errors import DesignError
 from circuittex.design import Design, Weave, parse_design, plain_weave
 from circuittex.design.wave import peirce
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
+from circuittex.relaxation.increment import advance
 from circuittex.relaxation.relax import force_terms, relax
 
 R, PITCH, WEFT_PITCH = 0.15, 2.0, 1.5
@@ -159,3 +160,29 @@ def test_the_papers_path_is_what_it_was() -> None:
     weave = plain_weave().weave
     assert weave.path == "sine"
     assert isinstance(weave, Weave)
+
+
+def test_stretching_the_warp_moves_crimp_into_the_weft() -> None:
+    """Crimp interchange, with weft ends free: the waves' heights still add up to D, less by some per cent of pressing
+    at the contacts. Peirce's threads neither stretch nor resist bending, so that theirs change by more: fibrils of
+    R / p = 0.15 that are set in their weave go a part of that way, warp and weft."""
+    design = plain_weave(yarns=4, rows=(1,))
+    weave, apart, p, stretch = design.weave, 2 * R * 1.003, 1.0, 0.02
+    yarn = replace(weave.warp[0], crimp="path", heat_set=1.0)
+    weave = replace(weave, warp=(yarn,) * 4, weft=(yarn,) * 4, pitch=p, amplitude=apart / 2, path="peirce")
+    design = replace(design, weave=weave, contact=replace(design.contact, penalty="hertz"))
+    design = replace(design, numerics=replace(design.numerics, elements=32))
+    mesh = build_mesh(design)
+    start = relax(mesh, design).configuration
+    found = advance(mesh, design, start, np.eye(2), np.diag([1 + stretch, 1.0]), free_edges="y").equilibrium
+    lines = found.configuration.r.reshape(mesh.n_fibrils, -1, 3)
+    n = lines.shape[1]
+    warp, weft = (float(np.ptp(lines[f, n // 4 : 3 * n // 4, 2])) for f in (1, 5))  # amid the cell
+    thread = peirce(p, apart / 2, apart)
+    D, length = 2 * apart, thread.length
+    angle = brentq(lambda t: (length - D * t) * np.cos(t) + D * np.sin(t) - p * (1 + stretch), 1e-6, thread.angle)
+    flexible = (length - D * angle) * np.sin(angle) + D * (1 - np.cos(angle))
+    assert warp + weft == pytest.approx(D, rel=0.03)
+    for height, theirs in ((warp, flexible), (weft, D - flexible)):
+        part = (height - apart) / (theirs - apart)
+        assert 0.2 < part < 0.7

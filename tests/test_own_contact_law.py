@@ -57,7 +57,7 @@ def test_it_is_ten_lines(example: dict[str, Any]) -> None:
 
 def test_a_file_can_name_it_once_it_is_known(example: dict[str, Any]) -> None:
     assert ct.parse_design(with_law("rough")).contact.law == "rough"
-    with pytest.raises(DesignError, match=r"contact\.law: 'smooth' .* 'power', 'rough'"):
+    with pytest.raises(DesignError, match=r"contact\.law: 'smooth' .* 'power', .*'rough'"):
         ct.parse_design(with_law("smooth"))
     assert ct.design_hash(ct.parse_design(with_law("rough"))) != ct.design_hash(ct.parse_design(with_law("holm")))
     assert ct.design_hash(ct.parse_design(with_law("paper"))) == ct.design_hash(

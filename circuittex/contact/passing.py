@@ -223,7 +223,7 @@ def _sweep(
     for n in range(rising.shape[0]):
         i = rising[n]
         f, ends, x, y, z, w = fibril[i], high[n, 0], low[n, 1], high[n, 1], low[n, 2], high[n, 2]
-        for m in range(n + 1, rising.shape[0]):
+        for m in range(n, rising.shape[0]):  # the interval itself among them: chords of one may meet, too
             if low[m, 0] > ends:
                 break
             if low[m, 1] > y or high[m, 1] < x or low[m, 2] > w or high[m, 2] < z:

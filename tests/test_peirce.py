@@ -184,5 +184,4 @@ def test_stretching_the_warp_moves_crimp_into_the_weft() -> None:
     flexible = (length - D * angle) * np.sin(angle) + D * (1 - np.cos(angle))
     assert warp + weft == pytest.approx(D, rel=0.03)
     for height, theirs in ((warp, flexible), (weft, D - flexible)):
-        part = (height - apart) / (theirs - apart)
-        assert 0.2 < part < 0.7
+        assert 0.0 < (height - apart) / (theirs - apart) < 1.0  # none of rigid threads, all of flexible ones

@@ -147,7 +147,7 @@ class _Parser:
                 self.atom(depth)
             self.steps.append(("^", 2))
             if self.at("**", "^"):
-                raise ValueError(f"a power of a power needs parentheses in {self.text!r}: simulators disagree about it")
+                raise ValueError(f"a power of a power needs parentheses in {self.text!r}: programs disagree about it")
 
     def signed_exponent(self, depth: int) -> None:
         negative = self.token == "-"

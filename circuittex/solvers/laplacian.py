@@ -30,7 +30,7 @@ _ROUNDS = 6
 _FEW, _SMALL = 2, 100_000
 """Up to this many columns multigrid is faster from this many unknowns on (benchmarks/panel.py)."""
 LARGEST_DIRECT = 3_000_000
-"""Unknowns of a factorisation at most: for 64 columns it takes some 6 GB and 80 s, multigrid ten minutes."""
+"""Unknowns of a factorisation at most: for 64 columns it takes some 6 GB and 80 s, multigrid 8 s each."""
 _BLOCK = 8
 """Columns that are solved at once, for memory's sake."""
 _COARSE = 2000

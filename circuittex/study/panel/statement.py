@@ -192,6 +192,21 @@ class Panel:
         )
         for k, yarn in enumerate(insulating):
             yarns_named(yarn, shape, f"panel.insulating[{k}]")
+        for k, cut in enumerate(self.cuts):
+            corners = cut.rectangle if cut.line is None else (*np.min(cut.line, axis=0), *np.max(cut.line, axis=0))
+            self._check_inside(f"cuts[{k}]", cut.rectangle or cut.line, corners)
+        for k, seam in enumerate(self.seams):
+            self._check_inside(f"seams[{k}].rectangle", seam.rectangle, seam.rectangle)
+
+    def _check_inside(self, at: str, stated: object, corners: tuple[float, ...] | None) -> None:
+        """Refuse what lies beside the panel and would do nothing."""
+        if corners is None:
+            return
+        (x0, y0, x1, y1), (width, height) = corners, self.size
+        if x1 < 0.0 or y1 < 0.0 or x0 > width or y0 > height:
+            raise refuse(
+                at, stated, f"it lies beside the panel, which reaches from (0, 0) to ({width:g}, {height:g}) mm"
+            )
 
     @property
     def size(self) -> tuple[float, float]:

@@ -29,7 +29,9 @@ from circuittex.results.store import write_study_start
 from circuittex.study.export import simplified
 from circuittex.study.library.bicubic import left_out, patches, value_at
 from circuittex.study.library.export import export_library
+from circuittex.study.library.fit_corners import FitCorner
 from circuittex.study.library.interpolation import pieces, value
+from circuittex.study.library.levels import Levels
 from circuittex.study.library.strain_grid import grids
 
 pytestmark = pytest.mark.xdist_group("library_grid")  # what its fixtures make serves one worker
@@ -327,6 +329,15 @@ def test_the_interpolation_converges_on_finer_grids() -> None:
     assert errors[1] / errors[2] > 4.0
 
 
+def scaled_fits(known: Levels, _: object) -> tuple[FitCorner, ...]:
+    """The cell with all resistances divided by a factor, in place of fits that take half a minute."""
+    corners = {"_p05": 1.18, "_p50": 1.0, "_p95": 0.82}
+    return tuple(
+        FitCorner(end, 3, replace(known, along=known.along / factor, across=known.across / factor))
+        for end, factor in corners.items()
+    )
+
+
 @pytest.fixture(scope="module")
 def packings(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three packings whose resistances are all those of the study over 0.8 to 1.2, within tolerances of 10 %."""
@@ -353,7 +364,7 @@ def packings(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     with pytest.MonkeyPatch.context() as monkeypatch:
         monkeypatch.setattr("circuittex.study.library.export.write_datasheet", lambda *_: None)
-        monkeypatch.setattr("circuittex.study.library.facts.fit_corners", lambda *_: ())  # of the cells: elsewhere
+        monkeypatch.setattr("circuittex.study.library.facts.fit_corners", scaled_fits)
         export_library(made, folder, dialects=("ngspice",), members=map(member, (0.8, 1.0, 1.2)))
     return folder / "ngspice"
 
@@ -376,6 +387,15 @@ def test_a_place_among_packings_and_tolerances_beside_both_strains(
     found, flags = measured(packings, f"fabric_ports_{name}_stretch_x_shear_s", states, given)
     np.testing.assert_allclose(found, np.array([state_at(*state) for state in states]) / factor, rtol=SAMPLED)
     np.testing.assert_allclose(flags, 0.0, atol=1e-12)
+
+
+def test_the_cell_has_corners_beside_both_strains(packings: Path) -> None:
+    states = [(0.025, -0.04), (0.06, -0.01)]
+    plain, _ = measured(packings, "fabric_cell_stretch_x_shear_s", states)
+    found, _ = measured(packings, "fabric_cell_mc_stretch_x_shear_s", states, "mc=1.6448536269514722")
+    np.testing.assert_allclose(found, plain / 0.82, rtol=SAMPLED)
+    found, _ = measured(packings, "fabric_cell_p05_stretch_x_shear_s", states)
+    np.testing.assert_allclose(found, plain / 1.18, rtol=SAMPLED)
 
 
 def test_the_datasheet_draws_the_grid(library: Path) -> None:

@@ -160,7 +160,7 @@ def _parts(study: Study, known: Facts, word: str, chosen: int, ends: str, factor
     for path in known.paths:
         yield from strained_parts(word, design, known.levels, known.reductions, path, known.fit_corners)
     for grid in known.grids:
-        yield from grid_parts(word, design, known.levels, known.reductions, grid)
+        yield from grid_parts(word, design, known.levels, known.reductions, grid, known.fit_corners)
 
 
 def _write(

@@ -11,18 +11,24 @@ import numpy as np
 from circuittex.base.errors import CircuitError, CircuittexWarning
 from circuittex.design import Design
 from circuittex.electrical.network.names import unique_names
+from circuittex.study.library.fit_corners import FitCorner
 from circuittex.study.library.levels import Levels
 from circuittex.study.library.network import FLAG, Axis, Network, circuit_network, ports_network
-from circuittex.study.library.parts import TITLES, Part, monte_carlo, strained, tolerated, unit_network
+from circuittex.study.library.parts import TITLES, Part, monte_carlo, strained, title_of, tolerated, unit_network
 from circuittex.study.library.reduction import CORNERS, TOLERANCES, Reduction
 from circuittex.study.library.strain_grid import StrainGrid
 
 
 def grid_parts(
-    name: str, design: Design, known: Levels, reductions: Sequence[Reduction], grid: StrainGrid
+    name: str,
+    design: Design,
+    known: Levels,
+    reductions: Sequence[Reduction],
+    grid: StrainGrid,
+    fits: Sequence[FitCorner] = (),
 ) -> Iterator[Part]:
-    """Ports, cell and unit with both strains as parameters and as pins, and ports with a place among the corners of an
-    ensemble, or within tolerances, as a third parameter."""
+    """Ports, cell and unit with both strains as parameters and as pins; ports and cell with a place among the corners
+    of an ensemble, and ports with one within tolerances, as a third parameter."""
     states = grid.records.ravel().tolist()
     number = np.arange(float(len(states)))
     networks = {each.end: on_grid(ports_network([each.ports[k] for k in states], number), grid) for each in reductions}
@@ -42,6 +48,11 @@ def grid_parts(
         return
     for level, network in found.items():
         yield from strained(name, design, level, "", TITLES[level], on_grid(network, grid), grid.word)
+    at = [on_grid(circuit_network([fit.levels.cells[k] for k in states], number, known.pins), grid) for fit in fits]
+    for fit, network in zip(fits, at, strict=True):
+        yield from strained(name, design, "cell", fit.end, title_of(fit), network, grid.word)
+    if fits:
+        yield from monte_carlo(name, design, "cell", at, grid.word)
 
 
 def on_grid(network: Network, grid: StrainGrid) -> Network:

@@ -88,10 +88,11 @@ def fixed_parts(
         yield _fixed(name, design, "unit", "", TITLES["unit"], unit_network(known.units[[state]], nothing))
     for fit in fits:
         network = circuit_network([fit.levels.cells[state]], nothing, known.pins)
-        yield _fixed(name, design, "cell", fit.end, _title(fit), network)
+        yield _fixed(name, design, "cell", fit.end, title_of(fit), network)
 
 
-def _title(fit: FitCorner) -> str:
+def title_of(fit: FitCorner) -> str:
+    """What the cell of a corner is, one line."""
     return f"Ry and Rc, each at percentile {fit.end[2:]} of {fit.packings} packings"
 
 
@@ -130,7 +131,7 @@ def strained_parts(
         yield from strained(name, design, level, "", TITLES[level], network, path.word)
     at = [circuit_network([fit.levels.cells[k] for k in path.records], path.strain, known.pins) for fit in fits]
     for fit, network in zip(fits, at, strict=True):
-        yield from strained(name, design, "cell", fit.end, _title(fit), network, path.word)
+        yield from strained(name, design, "cell", fit.end, title_of(fit), network, path.word)
     if fits:
         yield from monte_carlo(name, design, "cell", at, path.word)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.contact.penalty import PenaltyContact
-from circuittex.design import ContactLaw, Design, plain_weave
+from circuittex.design import ContactLaw, Design, Material, Weave, Yarn, plain_weave
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.permutation import permuted
 from circuittex.geometry.weave import build_mesh
@@ -28,6 +28,30 @@ class Cell:
     mesh: FibrilMesh
     relaxed: Equilibrium
     stretched: Equilibrium
+
+
+def resized(weave: Weave, s: float, material: Callable[[Material], Material]) -> Weave:
+    """The weave with lengths times s and each material as `material` makes it."""
+
+    def yarns(of: tuple[Yarn, ...]) -> tuple[Yarn, ...]:
+        return tuple(
+            replace(
+                yarn,
+                radius=s * yarn.radius,
+                spacing=s * yarn.spacing,
+                row_spacing=s * yarn.row_spacing,
+                materials=tuple(map(material, yarn.materials)),
+            )
+            for yarn in of
+        )
+
+    return replace(
+        weave,
+        warp=yarns(weave.warp),
+        weft=yarns(weave.weft),
+        pitch=s * weave.pitch,
+        amplitude=s * weave.amplitude,
+    )
 
 
 def fibrils_through(

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fabrics import resized
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from circuittex.base.errors import ConvergenceError, PenetrationError
 from circuittex.base.frozen import same
-from circuittex.design import ContactLaw, Design, Yarn, load_design, plain_weave
+from circuittex.design import ContactLaw, Design, load_design, plain_weave
 from circuittex.design.restated import restated
 from circuittex.geometry.weave import build_mesh
 from circuittex.relaxation.relax import relax
@@ -26,29 +27,10 @@ PRINTED = 6e-3
 
 def written(design: Design, s: float, m: float) -> Design:
     """The design with lengths times s and moduli times m, each product as it is rounded."""
-
-    def yarns(of: tuple[Yarn, ...]) -> tuple[Yarn, ...]:
-        return tuple(
-            replace(
-                yarn,
-                radius=s * yarn.radius,
-                spacing=s * yarn.spacing,
-                row_spacing=s * yarn.row_spacing,
-                materials=tuple(replace(each, youngs_modulus=m * each.youngs_modulus) for each in yarn.materials),
-            )
-            for yarn in of
-        )
-
-    weave, law = design.weave, design.contact
+    law = design.contact
     return replace(
         design,
-        weave=replace(
-            weave,
-            warp=yarns(weave.warp),
-            weft=yarns(weave.weft),
-            pitch=s * weave.pitch,
-            amplitude=s * weave.amplitude,
-        ),
+        weave=resized(design.weave, s, lambda each: replace(each, youngs_modulus=m * each.youngs_modulus)),
         contact=law if isinstance(law.penalty, str) else replace(law, penalty=m * law.penalty),
     )
 

@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from fabrics import resized
 
 from circuittex.contact.extract import contacts_of
-from circuittex.design import Design, Material, Packing, Yarn, plain_weave
+from circuittex.design import Design, Material, Packing, plain_weave
 from circuittex.electrical.fields import solve_probes
 from circuittex.electrical.network.circuit import build_circuit, build_circuits
 from circuittex.electrical.network.nodal import solve_nodal
@@ -77,28 +78,10 @@ def scaled(design: Design, scale: Scale) -> Design:
             thermal_conductivity=h * of.thermal_conductivity,
         )
 
-    def yarns(of: tuple[Yarn, ...]) -> tuple[Yarn, ...]:
-        return tuple(
-            replace(
-                yarn,
-                radius=s * yarn.radius,
-                spacing=s * yarn.spacing,
-                row_spacing=s * yarn.row_spacing,
-                materials=tuple(map(material, yarn.materials)),
-            )
-            for yarn in of
-        )
-
-    weave, law, packing = design.weave, design.contact, design.packing
+    law, packing = design.contact, design.packing
     return replace(
         design,
-        weave=replace(
-            weave,
-            warp=yarns(weave.warp),
-            weft=yarns(weave.weft),
-            pitch=s * weave.pitch,
-            amplitude=s * weave.amplitude,
-        ),
+        weave=resized(design.weave, s, material),
         contact=replace(
             law,
             penalty=law.penalty if isinstance(law.penalty, str) else m * law.penalty,

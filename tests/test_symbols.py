@@ -163,26 +163,6 @@ def example(library: Path) -> tuple[Path, Schematic]:
     return folder, Schematic.from_file(str(folder / "fabric_example.kicad_sch"))
 
 
-def test_symbols_for_qucs_are_where_it_looks_and_have_the_pins_in_order(library: Path) -> None:
-    """By the rules of its SpiceLibComp::loadSymbol: FILE/DEVICE.sym beside FILE.lib, `<.PortSym x y number angle name>`
-    and nodes in the order of the numbers; wires end on multiples of 10."""
-    cells = listed(library, "ngspice")
-    for cell in cells:
-        path = library / "ngspice" / cell["name"] / f"{cell['name']}.sym"
-        head, *lines, end = path.read_text("utf-8").splitlines()
-        assert (head, lines[0], end) == ("<Qucs Schematic 24.3.0>", "<Symbol>", "</Symbol>")
-        ports = [line.strip("<>").split()[1:] for line in lines[1:] if line.startswith("<.PortSym ")]
-        assert all(line.startswith(("<Line ", "<.PortSym ", "<.ID ")) and line.endswith(">") for line in lines[1:])
-        by_number = [name for _, _, number, _, name in sorted(ports, key=lambda port: int(port[2]))]
-        assert by_number == [pin["name"] for pin in cell["pins"]]
-        assert [int(port[2]) for port in ports] == list(range(1, len(ports) + 1))
-        places = [(int(x), int(y)) for x, y, *_ in ports]
-        assert len(set(places)) == len(places)
-        assert all(x % 10 == 0 and y % 10 == 0 for x, y in places)
-        lines_to = [[int(word) for word in line.split()[1:5]] for line in lines[1:] if line.startswith("<Line ")]
-        assert set(places) <= {(x, y) for x, y, _, _ in lines_to}
-
-
 def test_the_example_project_runs(library: Path) -> None:
     """A divider written by hand, with the same fabric, gives the same transient."""
     folder, sheet = example(library)
@@ -284,7 +264,7 @@ def test_ids_of_the_example_differ(library: Path) -> None:
 def test_a_library_without_these_programs_has_no_symbols(tmp_path: Path) -> None:
     with pytest.warns(match="one state"):
         export_library(study(1), tmp_path, dialects=("xyce",))
-    assert not [path for path in tmp_path.rglob("*") if path.suffix in (".asy", ".kicad_sym", ".kicad_sch", ".sym")]
+    assert not [path for path in tmp_path.rglob("*") if path.suffix in (".asy", ".kicad_sym", ".kicad_sch")]
 
 
 WORD = re.compile(r'[^\s()"]+')

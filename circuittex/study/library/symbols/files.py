@@ -11,18 +11,15 @@ from circuittex.study.library.network import Network
 from circuittex.study.library.symbols.kicad import symbol_library
 from circuittex.study.library.symbols.ltspice import asy
 from circuittex.study.library.symbols.project import divider, example_project
-from circuittex.study.library.symbols.qucs import sym
 
 
 def write_symbols(folder: Path, name: str, design: str, cells: Sequence[Cell], networks: Mapping[str, Network]) -> None:
-    """Write `kicad/NAME.kicad_sym` with an example project, an `.asy` beside each file for LTspice, and for Qucs-S a
-    `.sym` in a folder beside each file for ngspice.
+    """Write `kicad/NAME.kicad_sym` with an example project, and an `.asy` beside each file for LTspice.
 
     `networks`: what is between the pins of each cell, by its name. What a library has no files for gets no symbols.
     """
     run = [cell for cell in cells if cell.dialect == "ngspice"]
     files = {f"ltspice/{cell.name}.asy": asy(cell) for cell in cells if cell.dialect == "ltspice"}
-    files |= {f"ngspice/{cell.name}/{cell.name}.sym": sym(cell) for cell in run}
     if run:
         files[f"kicad/{name}.kicad_sym"] = symbol_library(run, design)
         shown = shown_cell(run)

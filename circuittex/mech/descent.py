@@ -58,11 +58,12 @@ def descend(
     scales, free = system.scales, np.ones(system.n)
     free[system.fixed] = 0.0
     pairs: Pairs = deque(maxlen=REMEMBERED)
-    solve, age, most = None, 0, stride
+    solve, shift, age, most = None, SHIFT, 0, stride
     for iteration in range(MOST_ITERATIONS):
         if solve is None or age >= LASTS:
             pattern, energy, gradient = system.assemble(q)
-            solve, age, allowed = _factor(system, solver, pattern, free), 0, system.limits(q, *limits)
+            solve, shift = _factor(system, solver, pattern, free, max(SHIFT, shift / 16))
+            age, allowed = 0, system.limits(q, *limits)
             if solve is None or not np.isfinite(energy):
                 return q, iteration
         force = free * gradient
@@ -92,15 +93,18 @@ def descend(
     return q, MOST_ITERATIONS
 
 
-def _factor(system: System, solver: LinearSolver, pattern: Pattern, free: Floats) -> Solve | None:
+def _factor(
+    system: System, solver: LinearSolver, pattern: Pattern, free: Floats, shift: float
+) -> tuple[Solve | None, float]:
+    """The factor with the first of `shift`, 4 `shift`, ... that makes it positive, None if none does; and that one."""
     stiffness, metric = (values[diagonal(pattern)] for values in (system.data, system.metric))
-    shift, largest = SHIFT, LARGEST_SHIFT * float((free * stiffness / metric).max())
+    largest = LARGEST_SHIFT * float((free * stiffness / metric).max())
     while shift <= largest:
         solve = system.factor(solver, shift, SOFTENING)
         if solve is not None:
-            return solve
+            return solve, shift
         shift *= 4
-    return None
+    return None, SHIFT
 
 
 def _direction(solve: Solve, pairs: Pairs, force: Floats) -> Floats:

@@ -13,6 +13,7 @@ from circuittex.base.arrays import Floats
 from circuittex.base.errors import DesignError
 from circuittex.contact.closest import _Meeting, _root, _Scratch
 from circuittex.contact.curve import BASIS, CurveTable, bezier, curve_table, curve_through, evaluate
+from circuittex.contact.hull import hulls
 from circuittex.contact.penalty import contact_points
 from circuittex.geometry.mesh import FibrilMesh
 
@@ -163,9 +164,10 @@ def test_beyond_a_fibrils_end_the_end_itself_is_closest() -> None:
     assert np.all(found.position_b[onto & ~first] == 5.0)
 
 
+@pytest.mark.parametrize("quick", [False, True])
 @given(seed=st.integers(0, 2**32 - 1), s=st.floats(0.01, 6.99), away=st.floats(-0.2, 0.2), start=st.floats(0.0, 1.0))
 def test_the_foot_of_a_normal_is_found_from_anywhere_and_found_again(
-    seed: int, s: float, away: float, start: float
+    quick: bool, seed: int, s: float, away: float, start: float
 ) -> None:
     """From any place on its interval the search reaches the foot; started at the foot it stays."""
     t = np.linspace(0.0, 2.0, 8)
@@ -177,8 +179,8 @@ def test_the_foot_of_a_normal_is_found_from_anywhere_and_found_again(
     k = float(int(s))
 
     def search(start: float) -> float:
-        meeting = _Meeting(0, 0, 0, 7, 1.0)
-        return float(_root(curve_through(table, r), meeting, start, k, k + 1.0, 1.0, scratch))
+        meeting, curve = _Meeting(0, 0, 0, 7, 1.0, quick), curve_through(table, r)
+        return float(_root(curve, hulls(curve), meeting, start, k, k + 1.0, 1.0, scratch))
 
     found = search(k + start)
     assert found == pytest.approx(s, abs=1e-12)
@@ -192,3 +194,19 @@ def test_contact_points_are_equally_spaced_and_symmetric(order: int, per_element
     at = np.sort(np.concatenate([k + row[row >= 0] for k, row in enumerate(table)])) / order
     assert np.abs(at - (np.arange(per_element) + 0.5) / per_element).max() < 1e-15
     assert np.abs(at + at[::-1] - 1).max() < 1e-15
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_quick_places_are_the_same_but_for_rounding(seed: int) -> None:
+    """A tangle's places by the powers of the local coordinate and by the weights of the nodes.
+
+    Where a minimum is flat its place is known to the root of round-off alone, and the distance to round-off.
+    """
+    term, q = contact_term(tangle(seed, fibrils=6, noise=0.1), per_element=3)
+    r = term.positions(q)
+    candidates = term._near(r)[0]
+    plain, quick = (term._search(candidates, r, quick=quick) for quick in (False, True))
+    deep = [each.overlap > ROUND_OFF for each in (plain, quick)]  # what touches in the last digit may differ
+    for name, one in vars(plain).items():
+        tolerance = np.sqrt(ROUND_OFF) if name == "position_b" else ROUND_OFF
+        assert one[deep[0]] == pytest.approx(vars(quick)[name][deep[1]], abs=tolerance)

@@ -74,31 +74,36 @@ class _Meeting(NamedTuple):
     """number of its intervals."""
     reach: float
     """R + R', mm."""
+    quick: bool
+    """Whether the powers of the local coordinate are followed, not the weights of the nodes."""
 
 
-def find_contacts(curve: Any, hull: Any, fibrils: Any, points: Floats, rows: Any, room: int) -> Found:
+def find_contacts(
+    curve: Any, hull: Any, fibrils: Any, points: Floats, rows: Any, room: int, *, quick: bool = False
+) -> Found:
     """All places within reach, for every candidate and every contact point of its interval, in that order.
 
     `points` (parity, T) are the local coordinates of the contact points of an interval, rows padded with -1; `rows` are
-    `Candidates`; `room` is the number of places expected: where there are more, they are found anew.
+    `Candidates`; `room` is the number of places expected: where there are more, they are found anew. `quick` places are
+    the same but for rounding, at a third of the cost.
     """
     while True:
         row, point = np.empty((2, room), dtype=np.int64)
         position, overlap, sign = np.empty((3, room))
         found = Found(row, point, position, overlap, sign)
-        count = int(_find(curve, hull, fibrils, points, rows, found))
+        count = int(_find(curve, hull, fibrils, points, rows, found, quick))
         if count <= room:
             return Found(row[:count], point[:count], position[:count], overlap[:count], sign[:count])
         room = count
 
 
 @compiled
-def _find(curve: Any, hull: Any, fibrils: Any, points: Any, rows: Any, found: Any) -> int:
+def _find(curve: Any, hull: Any, fibrils: Any, points: Any, rows: Any, found: Any, quick: bool) -> int:
     """Fill `found` as far as it reaches; the number of places there are."""
     scratch = _Scratch(np.empty(3), np.empty((3, 3)), np.empty(4), np.empty((64, 8)))
     # Taken out of their tuples once: to do so for every point would cost as much as the search.
     r, x, bulge, tangent, bend, speed = curve.r, scratch.x, hull.bulge, hull.tangent, hull.bend, hull.least_speed
-    interval, other, first, last, turn = rows.interval, rows.fibril, rows.first, rows.last, hull.turn
+    power, interval, other, first, last, turn = hull.power, rows.interval, rows.fibril, rows.first, rows.last, hull.turn
     fibril, radius, first_interval = fibrils.fibril, fibrils.radius, fibrils.first_interval
     count = 0
     for i in range(interval.shape[0]):
@@ -115,7 +120,7 @@ def _find(curve: Any, hull: Any, fibrils: Any, points: Any, rows: Any, found: An
             if t < 0.0:
                 continue
             evaluate(curve.basis[curve.kind[a]], r, curve.window[a], t, 0, scratch.weight, x)
-            meeting = _Meeting(i, p, base, n, reach)
+            meeting = _Meeting(i, p, base, n, reach, quick)
             known, slope, far = -1, 0.0, 0.0  # slope and square of the distance at the node `known`
             for j in range(first[i], last[i] + 1):
                 k = j - base
@@ -126,18 +131,21 @@ def _find(curve: Any, hull: Any, fibrils: Any, points: Any, rows: Any, found: An
                     slope, far = _at_node(r, tangent, x, node + k)
                 next_slope, next_far = _at_node(r, tangent, x, node + k + 1)
                 if k == 0 and not _negative(slope):
-                    count = _record(curve, meeting, 0.0, 1.0, scratch, found, count)
+                    count = _record(curve, hull, meeting, 0.0, 1.0, scratch, found, count)
                 rises = (np.sqrt(max(far, next_far)) + bulge[j]) * bend[j] < speed[j] ** 2
                 if own or not rises:
                     itself = t + a - j if own else -1.0
                     _coefficients(hull.points[j], x, scratch.pieces[0])
                     scratch.pieces[0, 0], scratch.pieces[0, 5] = slope, next_slope
-                    count = _isolate(curve, meeting, k, itself, scratch, found, count)
+                    count = _isolate(curve, hull, meeting, k, itself, scratch, found, count)
+                elif quick and _negative(slope) and not _negative(next_slope):
+                    s = _quick_root(power[j], x, k, 1e-14 * n, k + start, float(k), k + 1.0, 1.0)
+                    count = _keep(i, p, s, reach - _quick_distance(power[j], s - k, x), 1.0, found, count)
                 elif _negative(slope) and not _negative(next_slope):
-                    s = _root(curve, meeting, k + start, float(k), k + 1.0, 1.0, scratch)
-                    count = _record(curve, meeting, s, 1.0, scratch, found, count)
+                    s = _root(curve, hull, meeting, k + start, float(k), k + 1.0, 1.0, scratch)
+                    count = _record(curve, hull, meeting, s, 1.0, scratch, found, count)
                 if k == n - 1 and _negative(next_slope):
-                    count = _record(curve, meeting, float(n), 1.0, scratch, found, count)
+                    count = _record(curve, hull, meeting, float(n), 1.0, scratch, found, count)
                 known, slope, far = k + 1, next_slope, next_far
     return count
 
@@ -174,45 +182,40 @@ def _negative(value: float) -> bool:
 
 
 @compiled
-def _record(curve: Any, meeting: Any, s: float, sign: float, scratch: Any, found: Any, count: int) -> int:
+def _record(curve: Any, hull: Any, meeting: Any, s: float, sign: float, scratch: Any, found: Any, count: int) -> int:
     """Keep the place s if it is within reach."""
     k = min(meeting.n - 1, int(s))
-    x, y = scratch.x, scratch.place[0]
-    interval = meeting.base + k
-    evaluate(curve.basis[curve.kind[interval]], curve.r, curve.window[interval], s - k, 0, scratch.weight, y)
-    overlap = meeting.reach - np.sqrt((x[0] - y[0]) ** 2 + (x[1] - y[1]) ** 2 + (x[2] - y[2]) ** 2)
+    x, y, interval = scratch.x, scratch.place[0], meeting.base + k
+    if meeting.quick:
+        distance = _quick_distance(hull.power[interval], s - k, x)
+    else:
+        evaluate(curve.basis[curve.kind[interval]], curve.r, curve.window[interval], s - k, 0, scratch.weight, y)
+        distance = np.sqrt((x[0] - y[0]) ** 2 + (x[1] - y[1]) ** 2 + (x[2] - y[2]) ** 2)
+    return _keep(meeting.row, meeting.point, s, meeting.reach - distance, sign, found, count)
+
+
+@compiled
+def _keep(row: int, point: int, s: float, overlap: float, sign: float, found: Any, count: int) -> int:
     if overlap <= 0.0:
         return count
     if count < found.row.shape[0]:
-        found.row[count], found.point[count] = meeting.row, meeting.point
+        found.row[count], found.point[count] = row, point
         found.position[count], found.overlap[count], found.sign[count] = s, overlap, sign
     return count + 1
 
 
 @compiled
-def _root(curve: Any, meeting: Any, s: float, low: float, high: float, sign: float, scratch: Any) -> float:
+def _root(curve: Any, hull: Any, meeting: Any, s: float, low: float, high: float, sign: float, scratch: Any) -> float:
     """The root of sign phi', which rises from low to high (in nodes, on one interval), by Newton's method from s.
 
     Bisection keeps it between its bounds.
     """
-    x, place, weight, r, k, close = scratch.x, scratch.place, scratch.weight, curve.r, int(low), 1e-14 * meeting.n
-    basis, window = curve.basis[curve.kind[meeting.base + k]], curve.window[meeting.base + k]
+    k, close = int(low), 1e-14 * meeting.n
+    if meeting.quick:
+        return _quick_root(hull.power[meeting.base + k], scratch.x, k, close, s, low, high, sign)
     for _ in range(MAX_STEPS):
-        for derivative in range(3):
-            evaluate(basis, r, window, s - k, derivative, weight, place[derivative])
-        slope, bend = 0.0, 0.0
-        for c in range(3):
-            slope -= (x[c] - place[0, c]) * place[1, c]
-            bend += place[1, c] * place[1, c] - (x[c] - place[0, c]) * place[2, c]
-        slope, bend = sign * slope, sign * bend
-        if slope > 0.0:
-            high = s
-        else:
-            low = s
-        new = s - slope / bend if bend > 0.0 else np.inf
-        if new < low - close or new > high + close:
-            new = 0.5 * (low + high)
-        new = min(high, max(low, new))
+        slope, bend = _slope(curve, meeting.base + k, s - k, scratch)
+        low, high, new = _step(s, sign * slope, sign * bend, low, high, close)
         if abs(new - s) <= close:
             return new
         s = new
@@ -220,7 +223,70 @@ def _root(curve: Any, meeting: Any, s: float, low: float, high: float, sign: flo
 
 
 @compiled
-def _isolate(curve: Any, meeting: Any, k: int, itself: float, scratch: Any, found: Any, count: int) -> int:
+def _quick_root(power: Any, x: Any, k: int, close: float, s: float, low: float, high: float, sign: float) -> float:
+    """The same by powers. Newton's method keeps to the weights, which its tangent has: from a symmetric start rounding
+    decides which of its branches a weave takes, and the paper's cell would end in one that is 4 % higher in energy."""
+    for _ in range(MAX_STEPS):
+        slope, bend = _quick_slope(power, s - k, x)
+        low, high, new = _step(s, sign * slope, sign * bend, low, high, close)
+        if abs(new - s) <= close:
+            return new
+        s = new
+    return s
+
+
+@compiled
+def _step(s: float, slope: float, bend: float, low: float, high: float, close: float) -> tuple[float, float, float]:
+    """Bounds of the root that the slope at s leaves, and where to look next."""
+    if slope > 0.0:
+        high = s
+    else:
+        low = s
+    new = s - slope / bend if bend > 0.0 else np.inf
+    if new < low - close or new > high + close:
+        new = 0.5 * (low + high)
+    return low, high, min(high, max(low, new))
+
+
+@compiled
+def _slope(curve: Any, interval: int, t: float, scratch: Any) -> tuple[float, float]:
+    """phi' and phi'' at t of an interval, by the weights of its nodes."""
+    x, place, slope, bend = scratch.x, scratch.place, 0.0, 0.0
+    basis, window = curve.basis[curve.kind[interval]], curve.window[interval]
+    for derivative in range(3):
+        evaluate(basis, curve.r, window, t, derivative, scratch.weight, place[derivative])
+    for c in range(3):
+        slope -= (x[c] - place[0, c]) * place[1, c]
+        bend += place[1, c] * place[1, c] - (x[c] - place[0, c]) * place[2, c]
+    return slope, bend
+
+
+@compiled
+def _quick_slope(power: Any, t: float, x: Any) -> tuple[float, float]:
+    """The same by the coefficients of the powers of t: equal but for rounding, and several times quicker."""
+    slope, bend = 0.0, 0.0
+    for c in range(3):
+        away, speed = _cubic(power, c, t) - x[c], power[1, c] + t * (2 * power[2, c] + t * 3 * power[3, c])
+        slope += away * speed
+        bend += speed * speed + away * (2 * power[2, c] + 6 * t * power[3, c])
+    return slope, bend
+
+
+@compiled
+def _quick_distance(power: Any, t: float, x: Any) -> float:
+    square = 0.0
+    for c in range(3):
+        square += (x[c] - _cubic(power, c, t)) ** 2
+    return float(np.sqrt(square))
+
+
+@compiled
+def _cubic(power: Any, c: int, t: float) -> float:
+    return float(power[0, c] + t * (power[1, c] + t * (power[2, c] + t * power[3, c])))
+
+
+@compiled
+def _isolate(curve: Any, hull: Any, meeting: Any, k: int, itself: float, scratch: Any, found: Any, count: int) -> int:
     """All places on interval k of a fibril on which phi' may fall, in their order.
 
     The first of the scratch's pieces holds its Bernstein coefficients. `itself`: where the contact point itself lies,
@@ -251,8 +317,8 @@ def _isolate(curve: Any, meeting: Any, k: int, itself: float, scratch: Any, foun
         top -= 1
         if changes % 2 == 1:
             sign = -1.0 if falling else 1.0
-            s = _root(curve, meeting, k + 0.5 * (low + high), k + low, k + high, sign, scratch)
-            count = _record(curve, meeting, s, sign, scratch, found, count)
+            s = _root(curve, hull, meeting, k + 0.5 * (low + high), k + low, k + high, sign, scratch)
+            count = _record(curve, hull, meeting, s, sign, scratch, found, count)
     return count
 
 

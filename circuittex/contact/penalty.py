@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeGuard
 
@@ -151,11 +150,8 @@ class PenaltyContact:
         """All contact points that overlap at q; candidates are searched for it if q lies outside their reach."""
         if self._last is not None and np.array_equal(self._last[0], q):
             return self._last[1]
-        return self._touching(q, self._near)
-
-    def _touching(self, q: Floats, near: Callable[[Floats], tuple[Candidates, Floats]]) -> Touching:
         r = self.positions(q)
-        found = self._search(near(r)[0], r)
+        found = self._search(self._near(r)[0], r, quick=False)
         self._last = q.copy(), found
         return found
 
@@ -164,7 +160,7 @@ class PenaltyContact:
         found = self.touching(q)
         return float(0.5 * np.sum(self._stiffness(found) * found.overlap**2))
 
-    def _search(self, candidates: Candidates, r: Floats) -> Touching:
+    def _search(self, candidates: Candidates, r: Floats, *, quick: bool) -> Touching:
         """The places of all candidates, in pieces on all cores; the result does not depend on their number."""
         table, points = self.table, self.points
         curve = curve_through(table, r)
@@ -173,7 +169,9 @@ class PenaltyContact:
 
         def piece(first: int, last: int) -> Found:
             rows = Candidates(*(column[first:last] for column in candidates))
-            found = find_contacts(curve, hull, self.fibrils, points, rows, points.shape[1] * (last - first))
+            found = find_contacts(
+                curve, hull, self.fibrils, points, rows, points.shape[1] * (last - first), quick=quick
+            )
             return found._replace(row=found.row + first)
 
         with ThreadPoolExecutor(cores()) as pool:
@@ -225,9 +223,10 @@ class PenaltyContact:
 
     def add_gradient(self, q: Floats, gradient: Floats) -> float:
         """Add the gradient in place; return the energy."""
-        found = self._touching(q, self._around)
+        r = self.positions(q)
+        found = self._search(self._around(r)[0], r, quick=True)
         touches = self._touches(found)
-        add_forces(curve_through(self.table, self.positions(q)), touches, gradient)
+        add_forces(curve_through(self.table, r), touches, gradient)
         return float(0.5 * np.sum(touches.stiffness * found.overlap**2))
 
     def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:

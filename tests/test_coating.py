@@ -233,7 +233,7 @@ def test_no_shell_is_the_core_bit_for_bit() -> None:
 def test_a_shell_of_the_core_s_own_numbers_is_the_core_bit_for_bit() -> None:
     bare = build_mesh(stated({"shell": None}))
     alike = build_mesh(stated({"shell_thickness": "20 um"}, shell={"youngs_modulus": "10 MPa"}))
-    changed = {"material_names", "surface_conductivity", "bending_radius"}
+    changed = {"material_names", "surface_conductivity", "bending_radius", "shell_thickness", "core_conductivity"}
     assert all(same(getattr(bare, f.name), getattr(alike, f.name)) for f in fields(bare) if f.name not in changed)
     assert same(alike.surface, bare.electrical_conductivity)
     assert same(alike.section_radius, bare.radius)
@@ -263,7 +263,7 @@ def test_an_insulating_shell_conducts_along_and_not_across() -> None:
 
 @pytest.mark.parametrize("law", ["paper", "holm"])
 def test_contacts_meet_the_shell(law: str) -> None:
-    """The same load and width with a core that insulates; with `holm` 4 a / (2 / sigma) with the sigma of the shell."""
+    """The same load and width as of bare fibrils; how the current of `holm` spreads in shells: tests/test_shells.py."""
 
     def contacts(yarn: dict[str, Any], core: float, shell: float) -> Any:
         moduli = {"youngs_modulus": "10 MPa"}
@@ -274,19 +274,22 @@ def test_contacts_meet_the_shell(law: str) -> None:
         mesh = build_mesh(design)
         return contacts_of(design, mesh, initial_configuration(mesh))
 
-    plated = contacts({"shell_thickness": "1.5 um"}, 0.0, 10.0)
+    plated = contacts({"shell_thickness": "1.5 um"}, 10.0 if law == "holm" else 0.0, 10.0)
     bare = contacts({"shell": None}, 10.0, 0.0)
     assert plated.conductance == pytest.approx(bare.conductance, rel=ROUNDING, abs=0)
     assert (plated.conductance > 0.0).any()
 
 
 @pytest.mark.parametrize(
-    ("law", "shell", "doubted"), [("holm", 10.0, True), ("crossed", 10.0, False), ("holm", 1.0, False)]
+    ("law", "core", "shell", "doubted"),
+    [("holm", 2.0, 10.0, True), ("crossed", 2.0, 10.0, False), ("holm", 2.0, 1.0, False), ("holm", 0.0, 10.0, False)],
 )
-def test_touches_wider_than_their_shell_is_thick_are_doubted(law: str, shell: float, doubted: bool) -> None:
-    """Where the law spreads current into a half space, and the core does not conduct it as well."""
+def test_touches_wider_than_their_shell_is_thick_are_doubted(
+    law: str, core: float, shell: float, doubted: bool
+) -> None:
+    """Where the law knows how current spreads in a shell alone and in a half space, and the truth lies between."""
     design = stated(
-        {"shell_thickness": "1 um"}, fibril={"electrical_conductivity": 2.0}, shell={"electrical_conductivity": shell}
+        {"shell_thickness": "1 um"}, fibril={"electrical_conductivity": core}, shell={"electrical_conductivity": shell}
     )
     design = replace(design, contact=replace(design.contact, law=law))
     mesh = build_mesh(design)

@@ -39,7 +39,8 @@ class Touches:
     modulus: Floats
     """(P,) E* of the pair, MPa."""
     bulk_a: Floats
-    """(P,) sigma of the surface of the fibril of lower number, S/mm: of its shell where it is coated."""
+    """(P,) sigma of the half space in which the current spreads from the spot as it does in the fibril of lower number,
+    S/mm: its own; of its shell or, where that is thin beside the spot and the core conducts less, a part of that."""
     bulk_b: Floats
     """(P,) sigma of the other, S/mm."""
     film: Floats
@@ -71,7 +72,10 @@ def crossed(touches: Touches) -> Floats:
 
 
 def holm(touches: Touches) -> Floats:
-    """4 a / (1/sigma + 1/sigma'), S: the current is constricted to the spot of the touch, of radius a."""
+    """4 a / (1/sigma + 1/sigma'), S: the current is constricted to the spot of the touch, of radius a.
+
+    In thin shells it spreads as in a sheet (`spot_on_shell`), which the sigmas, `Touches.bulk_a` and `bulk_b`, hold.
+    """
     return 4 * touches.spot * in_series(touches.bulk_a, touches.bulk_b)
 
 

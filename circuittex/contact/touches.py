@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.frozen import frozen
 from circuittex.contact.conductance import PER_LENGTH, Touches, of_touches
-from circuittex.contact.constriction import spot_of_ellipse, spot_of_strip
+from circuittex.contact.constriction import on_core, spot_of_ellipse, spot_of_strip, spot_on_shell, strip_on_shell
 from circuittex.contact.ellipse import hertz_ellipse
 from circuittex.contact.law import (
     effective_modulus,
@@ -83,7 +83,7 @@ def _touches(mesh: FibrilMesh, law: ContactLaw, points: Points, spacing: Floats)
     xi = np.stack([np.where(swap, points.xi_b, points.xi_a), np.where(swap, points.xi_a, points.xi_b)], axis=1)
     step = np.maximum(spacing[a], spacing[b])
     found = patches(patch_of(a * mesh.n_fibrils + b, xi, step), points.load, points.weight, points.square)
-    first = np.unique(found.patch, return_index=True)[1]
+    first, low, high = np.unique(found.patch, return_index=True)[1], a, b
     a, b, step = a[first], b[first], step[first]
     R, other, E, nu = mesh.radius[a], mesh.radius[b], mesh.youngs_modulus, mesh.poisson_ratio
     modulus = effective_modulus(E[a], nu[a], E[b], nu[b])
@@ -96,17 +96,38 @@ def _touches(mesh: FibrilMesh, law: ContactLaw, points: Points, spacing: Floats)
         np.ones(1), points.half_width, np.sqrt(mesh.radius[points.a] * mesh.radius[points.b])
     )
     strip_area, strip_spot = (of_patches(found.patch, each) for each in (2 * points.half_width * points.weight, along))
+    bare = spot_of_ellipse(ellipse)
+    spot = (1 - part) * bare + part * strip_spot
+
+    def bulk(fibril: Ints, of_point: Ints) -> Floats:
+        """sigma of the half space in which the current of a touch would spread as it does in its fibril."""
+        if not len(mesh.shell_thickness):
+            return mesh.surface[fibril]
+        mean, t, radius = (ellipse.long + ellipse.short) / 2, _thickness(mesh, fibril), mesh.radius[fibril]
+        strips = strip_on_shell(points.weight, points.half_width, _thickness(mesh, of_point), mesh.radius[of_point])
+        shell = (1 - part) * spot_on_shell(bare, mean, t, radius) + part * of_patches(found.patch, strips)
+        surface = mesh.surface[fibril]
+        within = np.divide(mesh.core_conductivity[fibril], surface, out=np.ones_like(surface), where=surface > 0.0)
+        spread = on_core(shell, spot, within)
+        return np.asarray(np.where(mesh.shell_thickness[fibril] > 0.0, surface * (spread / spot), surface))
+
     return found, Touches(
         force=found.force,
         sine=found.sine,
         length=found.length,
         area=(1 - part) * ellipse.area + part * strip_area,
-        spot=(1 - part) * spot_of_ellipse(ellipse) + part * strip_spot,
+        spot=spot,
         radius_a=R,
         radius_b=other,
         modulus=modulus,
-        bulk_a=mesh.surface[a],
-        bulk_b=mesh.surface[b],
+        bulk_a=bulk(a, low),
+        bulk_b=bulk(b, high),
         film=pair_conductivity(mesh, law, a, b),
         **pair_constants(mesh, law, a, b),
     )
+
+
+def _thickness(mesh: FibrilMesh, fibril: Ints) -> Floats:
+    """Of the shells of fibrils, mm; the radius of those without one, for which nothing is made of it."""
+    thickness = mesh.shell_thickness[fibril]
+    return np.where(thickness > 0.0, thickness, mesh.radius[fibril])

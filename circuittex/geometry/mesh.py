@@ -62,6 +62,11 @@ class FibrilMesh:
     bending_radius: Floats = field(default_factory=lambda: np.empty(0))
     """(F,) radius of the homogeneous section of E that bends as the fibril does, mm; empty where none is coated."""
 
+    shell_thickness: Floats = field(default_factory=lambda: np.empty(0))
+    """(F,) t of the shells, mm, 0 of fibrils without one; empty where none is coated."""
+    core_conductivity: Floats = field(default_factory=lambda: np.empty(0))
+    """(F,) sigma within the shells, S/mm, or of the fibril itself; empty where none is coated."""
+
     @property
     def order(self) -> int:
         """Polynomial order of the elements (1 or 2)."""

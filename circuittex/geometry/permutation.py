@@ -27,7 +27,8 @@ def permuted(mesh: FibrilMesh, permutation: Ints) -> tuple[FibrilMesh, Ints]:
     nodes = np.concatenate([np.arange(mesh.first_node[f], mesh.first_node[f + 1]) for f in permutation])
     old = np.concatenate([np.arange(mesh.first_element[f], mesh.first_element[f + 1]) for f in permutation])
     place = np.argsort(nodes)
-    there = [name for name in ("material", "surface_conductivity", "bending_radius") if len(getattr(mesh, name))]
+    coats = "surface_conductivity", "bending_radius", "shell_thickness", "core_conductivity"
+    there = [name for name in ("material", *coats) if len(getattr(mesh, name))]
     tables = ["yarn", "length", "radius", *material_fields(), *there]
     other = replace(
         mesh,

@@ -65,6 +65,10 @@ def _coats(weave: Weave, surfaces: list[Material]) -> dict[str, Floats]:
     return {
         "surface_conductivity": np.array([material.electrical_conductivity for material in surfaces]),
         "bending_radius": np.array([radius for kind in weave.yarns for radius in kind.bending_radii]),
+        "shell_thickness": np.array([kind.shell_thickness for kind in weave.yarns for _ in kind.materials]),
+        "core_conductivity": np.array(
+            [core.electrical_conductivity for kind in weave.yarns for core in kind.materials]
+        ),
     }
 
 

@@ -94,14 +94,14 @@ def points_across(contacts: ContactState) -> float:
 def widest_on_shell(study: Study, contacts: ContactState) -> float:
     """Largest half-width of a touch over the thickness of the shell that it meets; 0 where there is none.
 
-    Of touches whose law has current spread into a half space, on shells that conduct better than their cores.
+    Of touches whose law knows shells on cores that insulate, on cores that conduct, though less than their shells: on
+    them its conductance is a bound.
     """
     design, mesh = study.design, contacts.mesh
-    yarns = design.weave.yarns
-    if not any(yarn.coated for yarn in yarns):
+    if not len(mesh.core_conductivity):
         return 0.0
-    thickness = np.array([yarn.shell_thickness if yarn.coated else np.inf for yarn in yarns])[mesh.yarn]
-    thickness = np.where(mesh.electrical_conductivity < mesh.surface, thickness, np.inf)
+    core = mesh.core_conductivity
+    thickness = np.where((core > 0.0) & (core < mesh.surface), mesh.shell_thickness, np.inf)
     names, a, b = mesh.material_names, contacts.fibril_a, contacts.fibril_b
     spreads = np.array([[design.contact.between(one, other).law in SPREADING for other in names] for one in names])
     rows = (contacts.conductance > 0.0) & spreads[mesh.material[a], mesh.material[b]]
@@ -164,7 +164,7 @@ def doubts(study: Study, record: Record) -> tuple[Doubt, ...]:
             "shell",
             widest_on_shell(study, record.contacts),
             f"half-widths of touches are up to {widest_on_shell(study, record.contacts):.2g} times as large as their "
-            'shell is thick: the laws "holm" and "film" spread current into a half space, and a sheet resists more',
+            'shell is thick, and its core conducts, too: the laws "holm" and "film" conduct less than the truth then',
         ),
     ]
     return tuple(doubt for doubt in found if doubt.excess >= 1.0)

@@ -10,7 +10,7 @@ import numpy as np
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.errors import CircuitError
 from circuittex.base.frozen import frozen
-from circuittex.design import Design, Probe, Yarn
+from circuittex.design import Design, Probe
 from circuittex.electrical.network.circuit import Circuit, reached_part, reduced_circuit, yarn_end_name
 from circuittex.electrical.network.matching import Groups, Match, groups, match_pairs, match_probes, pair_errors, spread
 from circuittex.electrical.network.nodal import solve_nodal
@@ -242,14 +242,10 @@ def _through(circuit: Circuit, design: Design, probe: Probe) -> float:
 
 def _through_conductors(design: Design, conductance: Floats) -> Floats:
     """(n,) the conductances, 0 for a probe with a terminal that has no conducting yarn: it says nothing of others."""
-    conducts = dict(zip(design.weave.yarn_names, map(_conducts, design.weave.yarns), strict=True))
+    conducts = dict(zip(design.weave.yarn_names, (yarn.conducts for yarn in design.weave.yarns), strict=True))
     live = {t.name: any(conducts[yarn] for yarn, _ in t.ends) for t in design.terminals}
     there = np.array([live[probe.source] and live[probe.sink] for probe in design.probes], dtype=bool)
     return np.where(there, conductance, 0.0)
-
-
-def _conducts(yarn: Yarn) -> bool:
-    return any(material.electrical_conductivity > 0.0 for material in yarn.fibrils)
 
 
 def _conducting_pairs(design: Design, grouping: Groups) -> dict[str, tuple[Ints, Ints]]:

@@ -54,7 +54,7 @@ def used(tmp_path: Path) -> Path:
         circuits = state_circuits(
             simplified(study.design, record.contacts), study.design.terminals, study.design.probes
         )
-        write_netlists(tmp_path / "netlists", study.design, record.name, circuits, record.fit)
+        write_netlists(tmp_path / "netlists", study.design, record.name, circuits, record.fit, study.design.probes)
     write_collections(tmp_path / "vtu", study)
     for figure in FIGURES:  # drawing takes long and has tests of its own
         for kind in ("png", "svg"):

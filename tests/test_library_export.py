@@ -16,6 +16,7 @@ from circuittex.base.errors import CircuitError, CircuittexWarning, DesignError,
 from circuittex.command.cli import main
 from circuittex.command.exit_codes import ExitCode
 from circuittex.electrical.network.ports import PortMatrix, resistances
+from circuittex.results.heating import rated_currents
 from circuittex.results.store import write_study_start
 from circuittex.study.library.accuracy import compared
 from circuittex.study.library.cell import Cell, Pin
@@ -24,7 +25,6 @@ from circuittex.study.library.interpolation import pieces, value, without
 from circuittex.study.library.members import complete_members, is_ensemble
 from circuittex.study.library.network import Network, farthest, floating, ports_network
 from circuittex.study.library.parts import pins
-from circuittex.study.library.rating import rated_currents
 from circuittex.study.library.strain_path import branches
 from circuittex.study.library.subcircuit import library_text
 from circuittex.study.library.thinning import thinned

@@ -162,7 +162,7 @@ def _netlist_text(study: Study, record: Record, options: argparse.Namespace) -> 
     simple = simplified(design, record.contacts, merge_length=length)
     if options.kind == "subckt":
         return detailed_netlist(design, record.name, state_circuits(simple), merge_length=length)
-    probe = _probe(design, options.probe)
+    probe = _probe(record.driven(design), options.probe)
     circuits = state_circuits(simple, design.terminals, [probe])
     return probe_netlist(design, record.name, circuits, probe, merge_length=length)
 
@@ -187,7 +187,7 @@ def _verify(options: argparse.Namespace) -> ExitCode:
     print(f"{'state':<20} {'V per V':>8} {'current':>8} {'merging':>8} {'mesh':>8}  routes")
     for record in records:
         simple = simplified(design, record.contacts)
-        check = verify(record.contacts, simple.contacts, design.terminals, design.probes)
+        check = verify(record.contacts, simple.contacts, design.terminals, record.driven(design).probes)
         differences = check.max_voltage_difference, check.max_current_difference
         checks.append(check)
         numbers = [*differences, check.merge_error, check.field_difference]

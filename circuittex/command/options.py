@@ -255,7 +255,10 @@ def _add_export(commands: Commands) -> None:
         help="write also ports with fewer resistors, of which no resistance is off by more than this part: 0.001",
     )
     parser.add_argument(
-        "--rise", metavar="K", type=float, default=10.0, help="temperature rise of the rated currents (default: 10 K)"
+        "--rise",
+        metavar="K",
+        type=float,
+        help="temperature rise of the rated currents (default: electrical.rated_rise of the design, 10 K)",
     )
     parser.add_argument(
         "--combine",

@@ -4,8 +4,6 @@ from circuittex.design.contact import HERTZ, ContactLaw, MaterialPair
 from circuittex.design.experiment import (
     Gradient,
     Loading,
-    Probe,
-    Terminal,
     biaxial,
     equal_steps,
     load_unload,
@@ -17,6 +15,7 @@ from circuittex.design.grid import strain_grid
 from circuittex.design.known_yarns import yarn_library
 from circuittex.design.packing import Packing
 from circuittex.design.paper import plain_weave
+from circuittex.design.probe import Probe, Terminal
 from circuittex.design.statement import Design, Electrical, Numerics, design_hash
 from circuittex.design.touching import touching_amplitude
 from circuittex.design.trade import (

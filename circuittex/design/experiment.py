@@ -1,4 +1,4 @@
-"""What is done to a textile: loadings, and electrical probes between terminals."""
+"""What is done to a textile: the loadings."""
 
 from __future__ import annotations
 
@@ -18,8 +18,6 @@ LEAST_STRETCH, MOST_STRETCH = 0.1, 5.0
 """Principal stretches of the cell: no fabric is stretched or crushed further, and no model of one would hold."""
 MOST_STATES = 10_000
 """Recorded states of one loading."""
-HIGHEST_VOLTAGE = 1e5
-"""V: in air, sparks leap over a cell long before."""
 
 
 @frozen
@@ -169,64 +167,3 @@ def check_gradient(gradient: object, field: str) -> Gradient:
         allowed = f"it stretches the cell by factors of {least:.3g} and {most:.3g}"
         raise refuse(field, gradient, f"{allowed}; from {LEAST_STRETCH:g} to {MOST_STRETCH:g} are allowed")
     return (xx, xy), (yx, yy)
-
-
-@frozen
-class Terminal:
-    """A named set of yarn ends whose fibril ends are joined.
-
-    >>> Terminal("right", (("warp2", +1),)).ends
-    (('warp2', 1),)
-    """
-
-    name: str
-    """What it is called."""
-    ends: tuple[tuple[str, int], ...]
-    """(yarn name, side): -1 for the end at xi3 = 0, +1 for the end at xi3 = L."""
-
-    def __post_init__(self) -> None:
-        at = f"terminals.{name(self.name, 'terminals')}"
-        wanted = "yarn ends such as ('warp2', +1)"
-        ends = [sequence(end, at, "a yarn's name and a side, -1 or +1") for end in sequence(self.ends, at, wanted)]
-        if not ends:
-            raise refuse(at, [], "it must list at least one yarn end, such as 'warp2+'")
-        seen: dict[tuple[str, int], None] = {}
-        for end in ends:
-            if len(end) != 2:
-                raise refuse(at, end, f"it must list {wanted}")
-            yarn, side = name(end[0], at), int(real(end[1], at))
-            if end[1] not in (-1, 1):
-                raise refuse(at, end[1], "the side of a yarn end must be -1 or +1")
-            if (yarn, side) in seen:
-                raise refuse(at, f"{yarn}{'+' if side > 0 else '-'}", "it is listed twice")
-            seen[yarn, side] = None
-        store(self, ends=tuple(seen))
-
-
-@frozen
-class Probe:
-    """A measurement: current flows from the source terminal, at `voltage`, to the sink, at 0 V.
-
-    >>> Probe("straight", "left", "right", 1.0).voltage
-    1.0
-    """
-
-    name: str
-    """What it is called."""
-    source: str
-    """Terminal name."""
-    sink: str
-    """Terminal name."""
-    voltage: float
-    """Of the source above the sink, V."""
-
-    def __post_init__(self) -> None:
-        at = f"probes.{name(self.name, 'probes.name')}"
-        store(
-            self, voltage=real(self.voltage, f"{at}.voltage", "V", at_least=-HIGHEST_VOLTAGE, at_most=HIGHEST_VOLTAGE)
-        )
-        store(self, source=name(self.source, f"{at}.source"), sink=name(self.sink, f"{at}.sink"))
-        if self.voltage == 0.0:
-            raise refuse(f"{at}.voltage", self.voltage, "it must not be 0 V, or no current flows")
-        if self.source == self.sink:
-            raise refuse(f"{at}.sink", self.sink, "it must be another terminal than the source")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from circuittex.design.checks import one_of, whole
 from circuittex.design.contact import ContactLaw
-from circuittex.design.experiment import Loading, Probe, Terminal
+from circuittex.design.experiment import Loading
+from circuittex.design.probe import Probe, Terminal
 from circuittex.design.statement import Design, Numerics
 from circuittex.design.weave import Weave
 from circuittex.design.yarn import Material, Yarn, check_rows

@@ -17,8 +17,6 @@ from circuittex.design.experiment import (
     MOST_STRETCH,
     Gradient,
     Loading,
-    Probe,
-    Terminal,
     biaxial,
     check_gradient,
     equal_steps,
@@ -29,6 +27,7 @@ from circuittex.design.experiment import (
 from circuittex.design.grid import AXES, strain_grid
 from circuittex.design.known_yarns import with_library
 from circuittex.design.packing import Packing
+from circuittex.design.probe import DRIVES, ONE_DRIVE, Probe, Terminal
 from circuittex.design.statement import FORMAT, Design, Electrical, Numerics
 from circuittex.design.table import Table, choose, quantity
 from circuittex.design.touching import AUTO, touching_amplitude
@@ -279,10 +278,14 @@ def _terminal(value: object, field: str, label: str) -> Terminal:
 
 
 def _probe(value: object, field: str) -> Probe:
-    table = Table(value, field, ("name", "source", "sink", "voltage"))
+    table = Table(value, field, ("name", "source", "sink", *DRIVES))
+    stated = [key for key in DRIVES if table.has(key)]
+    for key in stated[1:]:
+        raise refuse(table.at(key), table.value[key], ONE_DRIVE)
+    drive = {key: table.number(key, DRIVES[key]) for key in stated} or {"voltage": 1.0}
     return Probe(
         name=name(table.get("name", "a name for the probe"), table.at("name")),
         source=table.text("source", "the name of a terminal"),
         sink=table.text("sink", "the name of a terminal"),
-        voltage=table.number("voltage", "V"),
+        **drive,
     )

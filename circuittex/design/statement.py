@@ -10,9 +10,10 @@ from circuittex.base.frozen import frozen, same
 from circuittex.design.checks import distinct, instance, instances, refuse, store, title
 from circuittex.design.contact import ContactLaw
 from circuittex.design.declaration import check, choice, count, flag, number, relative
-from circuittex.design.experiment import Loading, Probe, Terminal
+from circuittex.design.experiment import Loading
 from circuittex.design.grid import starting_state
 from circuittex.design.packing import Packing
+from circuittex.design.probe import Probe, Terminal, check_probes, check_terminals
 from circuittex.design.resolution import Resolution, resolution
 from circuittex.design.units import parse
 from circuittex.design.weave import Weave
@@ -98,6 +99,18 @@ class Electrical:
         ),
     )
     """Relative permittivity of what is between the yarns, for capacitances of exported parts."""
+
+    rated_rise: float = field(
+        default=10.0,
+        kw_only=True,
+        metadata=number(
+            "K",
+            "of the hottest point, for which currents and powers are rated in report, summary and libraries",
+            shown="10 K",
+            above=0,
+        ),
+    )
+    """Rise of the hottest point, K, for which currents and powers are rated."""
 
     fit: str = field(
         default="auto",
@@ -292,8 +305,8 @@ class Design:
         self._check_lengths()
         self._check_packing()
         self._check_pairs()
-        self._check_terminals()
-        self._check_probes()
+        check_terminals(self.terminals, self.weave)
+        check_probes(self.probes, self.terminals, self.weave)
 
     @property
     def resolution(self) -> Resolution:
@@ -373,39 +386,6 @@ class Design:
                         map(repr, known)
                     )
                     raise refuse("contact.pairs.materials", material, allowed)
-
-    def _check_terminals(self) -> None:
-        known = self.weave.yarn_names
-        for terminal in self.terminals:
-            for yarn, side in terminal.ends:
-                if yarn not in known:
-                    label = f"{yarn}{'+' if side > 0 else '-'}"
-                    n, m = len(self.weave.warp), len(self.weave.weft)
-                    raise refuse(
-                        f"terminals.{terminal.name}",
-                        label,
-                        f"the weave has the yarns warp1 to warp{n} and weft1 to weft{m}",
-                    )
-
-    def _check_probes(self) -> None:
-        ends = {terminal.name: terminal.ends for terminal in self.terminals}
-        for probe in self.probes:
-            for role in ("source", "sink"):
-                if getattr(probe, role) not in ends:
-                    listed = ", ".join(map(repr, ends)) or "none"
-                    raise refuse(
-                        f"probes.{probe.name}.{role}",
-                        getattr(probe, role),
-                        f"it must be the name of a terminal; there are {listed}",
-                    )
-            shared = set(ends[probe.source]) & set(ends[probe.sink])
-            if shared:
-                yarn, side = min(shared)
-                raise refuse(
-                    f"probes.{probe.name}.sink",
-                    probe.sink,
-                    f"it shares the yarn end {yarn}{'+' if side > 0 else '-'} with the source {probe.source!r}",
-                )
 
 
 def design_hash(design: Design) -> str:

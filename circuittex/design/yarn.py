@@ -207,6 +207,11 @@ class Yarn:
         return tuple(alike[core] for core in self.materials)
 
     @property
+    def conducts(self) -> bool:
+        """Whether any of its fibrils does, along its axis."""
+        return any(material.electrical_conductivity > 0.0 for material in self.fibrils)
+
+    @property
     def surfaces(self) -> tuple[Material, ...]:
         """What each fibril touches others with: its shell, or its material where it has none."""
         return self.materials if self.shell is None or not self.coated else (self.shell,) * self.n_fibrils

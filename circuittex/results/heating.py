@@ -1,14 +1,15 @@
-"""What the probes of a state release, for each area of the fabric, and where it goes."""
+"""What the probes of a state release, for each area of the fabric, where it goes, and what they may be driven by."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from circuittex.base.arrays import Floats
 from circuittex.base.frozen import frozen
+from circuittex.design import Design
+from circuittex.design.probe import PER_CM2
+from circuittex.electrical.fields import Fields
 from circuittex.results.records import Record, Study
-
-PER_CM2 = 100.0
-"""W/mm2 in W/cm2."""
 
 
 @frozen
@@ -25,29 +26,73 @@ class Heating:
     """Part of it that leaves along the yarns; the rest goes out at their ends. nan where nothing is released."""
     rise: float
     """Largest temperature rise, K."""
+    voltage: float
+    """Of the source above the sink, V."""
+    rated_current: float
+    """The current at which the largest rise is the rated one, A; nan where nothing is warmed, and so the next two."""
+    rated_power: float
+    """The power that the source feeds in then, V I, W."""
+    rated_power_density: float
+    """For each area of the fabric, W/cm2."""
 
     def as_numbers(self) -> dict[str, str | float]:
         """By names with units, for summary.json."""
         return {
             "probe": self.probe,
+            "voltage_V": self.voltage,
             "power_W": self.power,
             "power_density_W_cm2": self.power_density,
             "peak_temperature_K": self.rise,
             "along_yarns": self.along,
+            "rated_current_A": self.rated_current,
+            "rated_power_W": self.rated_power,
+            "rated_power_density_W_cm2": self.rated_power_density,
         }
 
 
 def heating(study: Study, record: Record) -> tuple[Heating, ...]:
-    """The heat of each probe, on the area of the cell: its spans times the determinant of the average gradient."""
-    warps, wefts = study.design.weave.directions
-    area = warps.crossings * warps.step * wefts.crossings * wefts.step * float(np.linalg.det(record.gradient))
-    return tuple(
-        Heating(
-            field.probe,
-            field.heat,
-            PER_CM2 * field.heat / area,
-            field.heat_lost / field.heat if field.heat > 0.0 else float("nan"),
-            field.peak_temperature,
-        )
-        for field in record.fields
+    """The heat of each probe, and its ratings for the rise that the design states (`Electrical.rated_rise`)."""
+    area = fabric_area(study.design, record.gradient)
+    return tuple(_heating(field, area, study.design.electrical.rated_rise) for field in record.fields)
+
+
+def _heating(field: Fields, area: float, rise: float) -> Heating:
+    current, times = float(field.currents[0]), rating(field, rise)
+    power = field.voltage * current * times * times
+    return Heating(
+        probe=field.probe,
+        power=field.heat,
+        power_density=PER_CM2 * field.heat / area,
+        along=field.heat_lost / field.heat if field.heat > 0.0 else float("nan"),
+        rise=field.peak_temperature,
+        voltage=field.voltage,
+        rated_current=abs(current) * times,
+        rated_power=power,
+        rated_power_density=PER_CM2 * power / area,
     )
+
+
+def fabric_area(design: Design, gradient: Floats) -> float:
+    """Area of the cell at an average in-plane gradient, mm2: its spans, times the determinant.
+
+    >>> from circuittex.design import plain_weave
+    >>> round(fabric_area(plain_weave(), np.diag([1.25, 1.0])), 12)
+    80.0
+    """
+    warps, wefts = design.weave.directions
+    return warps.crossings * warps.step * wefts.crossings * wefts.step * float(np.linalg.det(gradient))
+
+
+def rating(field: Fields, rise: float) -> float:
+    """How many times its voltage and current a probe may have for a largest temperature rise of `rise`, K.
+
+    The equations of a probe are linear and its heat is quadratic in the voltage: the rise goes with the square of
+    voltage and current, hence sqrt(rise / peak). nan where nothing is warmed.
+    """
+    return float(np.sqrt(rise / field.peak_temperature)) if field.peak_temperature > 0.0 else float("nan")
+
+
+def rated_currents(study: Study, rise: float) -> Floats:
+    """(S, n) current in A of each probe in each state at which the largest temperature rise is `rise`, K; nan where
+    nothing is warmed."""
+    return np.array([[abs(float(f.currents[0])) * rating(f, rise) for f in record.fields] for record in study.records])

@@ -86,6 +86,14 @@ class Record:
         """Current of each probe into its source terminal, A."""
         return tuple(float(f.currents[0]) for f in self.fields)
 
+    def driven(self, design: Design) -> Design:
+        """The design with all probes driven by voltages: those that had them in this state, in place of what is stated
+        of others."""
+        if all(probe.voltage for probe in design.probes):
+            return design
+        pairs = zip(design.probes, self.fields, strict=True)
+        return replace(design, probes=tuple(probe.at(field.voltage) for probe, field in pairs))
+
     @property
     def outcome(self) -> Outcome:
         """The numbers by which equilibria are told apart."""

@@ -9,6 +9,7 @@ from circuittex.base.frozen import frozen
 from circuittex.contact.state import ContactState
 from circuittex.design import Design
 from circuittex.geometry.mesh import FibrilMesh
+from circuittex.results.heating import fabric_area
 from circuittex.results.records import Record, Study
 
 HOT = 300.0
@@ -16,6 +17,8 @@ HOT = 300.0
 SEEN = 1.4
 """Contact points across a contact: with fewer they see its middle or miss it by chance. Rc was 8 % off with 1.7 of
 them, 55 % with 0.3 (copper of 25 um)."""
+REACHED = 0.01
+"""Relative difference of a probe's current or power from what is stated: currents near nothing have few digits."""
 SPREADING = ("holm", "film")
 """Laws of conductance in which current spreads into a half space."""
 STRONGEST = 1e4
@@ -115,12 +118,29 @@ def _unreal(design: Design) -> str:
     return "no heat is lost to the air (electrical.heat_loss) and "
 
 
+def _not_driven(study: Study, record: Record) -> list[str]:
+    """The probes that do not carry the current, or take the power, that the design states."""
+    idle = []
+    area = fabric_area(study.design, record.gradient)
+    for probe, field in zip(study.design.probes, record.fields, strict=True):
+        current = float(field.currents[0])
+        if probe.current is not None:
+            part = current / probe.current
+        elif probe.power_density is not None:
+            part = field.voltage * current / (probe.power_density * area)
+        else:
+            continue
+        if field.voltage == 1.0 and not abs(part - 1.0) < REACHED:
+            idle.append(f"{probe.name} ({probe.drive})")
+    return idle
+
+
 @frozen
 class Doubt:
     """One reason to doubt a state."""
 
     kind: str
-    """'overlap', 'stress', 'temperature', 'mesh' or 'shell'."""
+    """'overlap', 'stress', 'temperature', 'drive', 'mesh' or 'shell'."""
     excess: float
     """How far it is beyond what gives no reason, as a ratio of at least 1."""
     text: str
@@ -153,6 +173,11 @@ def doubts(study: Study, record: Record) -> tuple[Doubt, ...]:
             rise / HOT,
             f"the temperature rises by up to {rise:.3g} K (warned of from {HOT:g} K on): {_unreal(study.design)}"
             "conductivities are constant, so that this is no prediction",
+        ),
+        Doubt(
+            "drive",
+            float(len(idle := _not_driven(study, record))),
+            f"no current flows by which it could be driven as stated, and it is at 1 V: {', '.join(idle)}",
         ),
         Doubt(
             "mesh",

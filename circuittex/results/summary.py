@@ -32,8 +32,10 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
     ``currents_A``, ``peak_temperature_K``
         current of each probe, and the largest temperature rise over all probes
     ``heating``
-        of each probe: ``power_W``, ``power_density_W_cm2`` of the fabric, ``peak_temperature_K``, and ``along_yarns``,
-        the part of the heat that leaves along the yarns rather than at their ends
+        of each probe: ``voltage_V``, ``power_W``, ``power_density_W_cm2`` of the fabric, ``peak_temperature_K``,
+        ``along_yarns``, the part of the heat that leaves along the yarns rather than at their ends, and
+        ``rated_current_A``, ``rated_power_W``, ``rated_power_density_W_cm2``: what the source may feed in for the
+        hottest point to rise by ``rated_rise`` of the parameters (``electrical``), null where nothing is warmed
     ``Ry_ohm``, ``Rc_ohm``, ``fit_residual``, ``fit_warnings``, ``network``, ``ports``
         the reduced network, its misfit, and what the fit warns of; ``Ry_ohm`` is null where there are several kinds of
         yarn, ``network`` has ``fitted_to``, ``Ry_ohm`` of each kind, ``Rc_ohm`` of each pair of kinds that cross,
@@ -45,8 +47,8 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
     ``deepest_overlap``, ``largest_stress_MPa``
         the deepest overlap of two fibrils over R + R', and the largest force of a section over its reference area
     ``doubts``
-        why the state cannot be right or trusted, in sentences: overlaps, stresses, temperatures, the mesh; empty if
-        all is well
+        why the state cannot be right or trusted, in sentences: overlaps, stresses, temperatures, the mesh, probes that
+        cannot be driven as stated; empty if all is well
     ``netlist``
         path of the detailed netlist, relative to the folder of the file
     ``error_estimate``
@@ -132,7 +134,9 @@ def table(study: Study) -> str:
 
     After it what the study took, what the branch checks found, which states to doubt, and whether ngspice confirmed it.
     A blank line parts the loading paths."""
+    driven = driven_otherwise(study.design)
     head = ["state", "Fx warp N", "Fy weft N", *(f"{probe.name} A" for probe in study.design.probes)]
+    head += [f"{study.design.probes[k].name} V" for k in driven]
     rows = [[*head, *(f"{name} ohm" for name in network_names(study)), "overlap", "iterations", "routes differ"]]
     loading = ""
     for record in study.records:
@@ -140,11 +144,13 @@ def table(study: Study) -> str:
             rows.append([""] * len(rows[0]))
             loading = record.loading
         force = record.clamp_force
-        numbers = [force[0, 0], force[1, 1], *record.currents, *record.outcome.network]
+        volts = [record.fields[k].voltage for k in driven]
+        numbers = [force[0, 0], force[1, 1], *record.currents, *volts, *record.outcome.network]
         rows.append([record.name, *(f"{number:#.4g}" if number == number else "-" for number in numbers)])
         rows[-1] += [f"{deepest_overlap(record.contacts)[0]:.2f}", str(record.iterations), f"{difference(record):.1e}"]
         if (error := study.error_of(record.name)) is not None:
-            cells = (_percent(quantity.relative) for quantity in error.quantities)
+            cells = [_percent(quantity.relative) for quantity in error.quantities]
+            cells[2 + len(study.design.probes) : 2 + len(study.design.probes)] = [""] * len(driven)
             rows.append(["  estimated error", *cells, "", "", ""])
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
@@ -166,6 +172,11 @@ def table(study: Study) -> str:
             *ngspice_statement(study),
         ]
     )
+
+
+def driven_otherwise(design: Design) -> tuple[int, ...]:
+    """Numbers of the probes that are not driven by a voltage, which follows in each state and is told then."""
+    return tuple(number for number, probe in enumerate(design.probes) if not probe.voltage)
 
 
 def network_names(study: Study) -> tuple[str, ...]:

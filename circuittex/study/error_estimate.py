@@ -88,6 +88,7 @@ def estimate_error(
 
     Raises `DesignError` as `variants` does.
     """
+    design = record.driven(design)  # errors of currents at the same voltages, where a current is stated as well
     free_edges = next((loading.free for loading in design.loading if loading.name == record.loading), "")
     repeats = []
     for words, other in zip(VARIANTS, variants(design), strict=True):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -43,11 +44,12 @@ def probe_netlist(
 ) -> str:
     """A runnable deck of the detailed network as one probe sees it: all other fibril ends insulated one by one.
 
-    `merge_length` as it was given to `simplified`, for the header.
+    `probe` is driven by a voltage (`Record.driven`), and so is the deck; where the `design` states something else, the
+    header says what. `merge_length` as it was given to `simplified`, for the header.
     """
     pins = [terminal.name for terminal in design.terminals if terminal.name in (probe.source, probe.sink)]
     circuit = with_ports(circuits.of(probe), pins)
-    notes = _simplification(design, circuits.simple, merge_length)
+    notes = (*_drive(design, probe), *_simplification(design, circuits.simple, merge_length))
     header = _header(design, state)(f"detailed resistor network, probe {probe.name}", notes=notes)
     return deck(circuit, {probe.source: probe.voltage, probe.sink: 0.0}, header)
 
@@ -98,11 +100,14 @@ def netlist_files(design: Design, state: str, fit: Fit | None) -> tuple[str, ...
     return (detailed_file(state), *decks, *reduced)
 
 
-def write_netlists(folder: Path, design: Design, state: str, circuits: StateCircuits, fit: Fit | None) -> Path:
-    """Write all netlists of a state into `folder`; returns the path of the detailed sub-circuit."""
+def write_netlists(
+    folder: Path, design: Design, state: str, circuits: StateCircuits, fit: Fit | None, probes: Sequence[Probe]
+) -> Path:
+    """Write all netlists of a state into `folder`, those of the `probes` as they are driven in it (`Record.driven`);
+    returns the path of the detailed sub-circuit."""
     folder.mkdir(parents=True, exist_ok=True)
     texts = [detailed_netlist(design, state, circuits)]
-    texts += [probe_netlist(design, state, circuits, probe) for probe in design.probes]
+    texts += [probe_netlist(design, state, circuits, probe) for probe in probes]
     files = netlist_files(design, state, fit)
     if fit is not None and len(files) > len(texts):
         texts.append(reduced_netlist(design, state, fit))
@@ -113,6 +118,14 @@ def write_netlists(folder: Path, design: Design, state: str, circuits: StateCirc
 
 def _header(design: Design, state: str) -> partial[Header]:
     return partial(Header, design=design.name, design_hash=design_hash(design), state=state)
+
+
+def _drive(design: Design, probe: Probe) -> tuple[str, ...]:
+    """What the voltage of a probe is for, where the design states something else."""
+    stated = next((each for each in design.probes if each.name == probe.name), probe)
+    return (
+        () if stated.voltage else (f"the source is the voltage that drives the probe in this state by {stated.drive}",)
+    )
 
 
 def _simplification(design: Design, simple: Simplified, merge_length: float | None) -> tuple[str, ...]:

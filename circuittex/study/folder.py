@@ -106,7 +106,8 @@ def write_state(folder: Path, study: Study, record: Record, circuits: StateCircu
     if not all((folder / "netlists" / name).exists() for name in files):
         if circuits is None:
             circuits = state_circuits(simplified(design, record.contacts), design.terminals, design.probes)
-        write_netlists(folder / "netlists", design, record.name, circuits, record.fit)
+        driven = record.driven(design).probes
+        write_netlists(folder / "netlists", design, record.name, circuits, record.fit, driven)
     vtu = folder / "vtu" / f"{record.name}.vtu"
     if not vtu.exists():
         vtu.parent.mkdir(exist_ok=True)

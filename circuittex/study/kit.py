@@ -167,7 +167,7 @@ def _record(study: Study, state: str | None) -> Record:
 
 def _cell(study: Study, record: Record) -> tuple[Circuit, dict[str, float], str]:
     """The circuit of the first probe that drives a current, its drive, and the probe's name."""
-    design = study.design
+    design = record.driven(study.design)
     circuits = state_circuits(simplified(design, record.contacts), design.terminals, design.probes)
     for probe in design.probes:
         circuit = circuits.of(probe)

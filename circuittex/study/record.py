@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
-from circuittex.base.errors import CircuitError, ConvergenceError, PenetrationError
+from circuittex.base.errors import ConvergenceError, PenetrationError
 from circuittex.base.frozen import frozen
 from circuittex.contact.extract import contacts_of
 from circuittex.design import Design
-from circuittex.electrical.fields import Fields, cooling_of, solve_probes
-from circuittex.electrical.network.circuit import Circuit, build_circuit
-from circuittex.electrical.network.nodal import solve_nodal
-from circuittex.electrical.network.one_pair import yarn_conductance
+from circuittex.electrical.fields import cooling_of, solve_probes
+from circuittex.electrical.network.circuit import build_circuit
 from circuittex.electrical.network.ports import port_matrix
 from circuittex.fit import fit_network
 from circuittex.geometry.levels import levels
@@ -25,14 +23,12 @@ from circuittex.relaxation.relax import Equilibrium, clamp_force, relax
 from circuittex.results.outcome import Outcome, outcome
 from circuittex.results.records import Record, Study
 from circuittex.study.circuits import StateCircuits, conducting_ends, probe_circuits, state_circuits
+from circuittex.study.drive import at_voltages, told_currents
 from circuittex.study.export import detailed_file, simplified
 from circuittex.study.plan import Step
 from circuittex.study.soundness import check_sound
 from circuittex.study.verify import field_convergence, verify
 from circuittex.study.verify_reduced import verify_reduced
-
-SMALL = 1e-6
-"""A probe with less than this part of a yarn's current: its digits are not those of the fields."""
 
 
 def reach(
@@ -100,9 +96,10 @@ def record_state(study: Study, step: Step, reached: Increment, say: Callable[[st
     Raises `PenetrationError`, naming the state, where fibrils passed through one another or overlap too deeply.
     """
     say(f"{step.name}: fields, netlists and verification")
-    design, mesh, equilibrium = study.design, study.mesh, reached.equilibrium
-    contacts = contacts_of(design, mesh, equilibrium.configuration)
+    mesh, equilibrium = study.mesh, reached.equilibrium
+    contacts = contacts_of(study.design, mesh, equilibrium.configuration)
     check_sound(study, step, equilibrium.configuration.r, contacts)
+    design = at_voltages(study.design, contacts, step.after)
     fields = solve_probes(
         contacts,
         design.terminals,
@@ -113,7 +110,7 @@ def record_state(study: Study, step: Step, reached: Increment, say: Callable[[st
     circuits = state_circuits(simplified(design, contacts), design.terminals, design.probes)
     whole = probe_circuits(contacts, design.terminals, design.probes)
     ports = port_matrix(circuits.conducting)
-    fit = fit_network(_told(fields, whole, design), design, ports)
+    fit = fit_network(told_currents(fields, whole, design), design, ports)
     convergence = np.empty((0, 2))
     if not step.loading:
         convergence = field_convergence(contacts, design.terminals, design.probes, fields)
@@ -153,30 +150,13 @@ def record_state(study: Study, step: Step, reached: Increment, say: Callable[[st
     return Recorded(record, circuits)
 
 
-def _told(fields: Sequence[Fields], circuits: Sequence[Circuit], design: Design) -> list[float]:
-    """The currents of the probes, A; those that are lost in the rounding of the fields beside a yarn's, by the nodal
-    solution, which keeps the digits of small currents. nan where these are lost, too."""
-    largest = yarn_conductance(design)
-    currents = []
-    for field, circuit, probe in zip(fields, circuits, design.probes, strict=True):
-        current = float(field.currents[0])
-        if abs(current) < SMALL * largest * abs(probe.voltage):
-            try:
-                solution = solve_nodal(circuit, {probe.source: probe.voltage, probe.sink: 0.0})
-                current = float(solution.port_current[circuit.ports.index(probe.source)])
-            except CircuitError:  # lost in rounding there as well
-                current = float("nan")
-        currents.append(current)
-    return currents
-
-
 def outcome_of(design: Design, mesh: FibrilMesh, equilibrium: Equilibrium) -> Outcome:
-    """The numbers of an equilibrium and nothing else, for one that is not recorded."""
+    """The numbers of an equilibrium and nothing else, for one that is not recorded; probes are driven by voltages."""
     contacts = contacts_of(design, mesh, equilibrium.configuration)
     fields = solve_probes(contacts, design.terminals, design.probes, contact_heat=design.electrical.contact_heat)
     currents = tuple(float(field.currents[0]) for field in fields)
     merged = simplified(design, contacts).contacts
-    told = _told(fields, probe_circuits(contacts, design.terminals, design.probes), design)
+    told = told_currents(fields, probe_circuits(contacts, design.terminals, design.probes), design)
     fit = fit_network(told, design, port_matrix(build_circuit(merged, conducting_ends(mesh))))
     return outcome(clamp_force(mesh, equilibrium.reaction), currents, fit, equilibrium.energy)
 

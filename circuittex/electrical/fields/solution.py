@@ -258,6 +258,9 @@ def _flow(
 ) -> _Flow:
     """Solve [38] for one probe on the fibrils that its terminals reach."""
     mesh = contacts.mesh
+    if not probe.voltage:
+        allowed = "its voltage follows in each recorded state: solve Record.driven(design).probes, or probe.at(volts)"
+        raise DesignError(f"probes.{probe.name}.{probe.stated}", probe.drive, allowed)
     source, sink = (_held(mesh, terminals, name) for name in (probe.source, probe.sink))
     if np.any(source & sink):
         fibril = int(np.argwhere(source & sink)[0, 1])

@@ -148,7 +148,7 @@ def uncoupled_currents(paper: PaperStudy, record: Record) -> Floats:
         conductance=nothing,
         heat_conductance=nothing,
     )
-    design = paper.study.design
+    design = record.driven(paper.study.design)
     solved = solve_probes(bare, design.terminals, [design.probes[number] for number in paper.probes])
     return np.array([fields.currents[0] for fields in solved])
 

@@ -67,7 +67,7 @@ def conductance_figure(study: Study) -> Figure:
             _widen(axes)
             draw_error_bars(axes, _bars(study, loadings.values(), f"I {probe.name}"), COLOURS[number % len(COLOURS)])
             axes.set_title(f"probe {probe.name}")
-            axes.set_ylabel(f"current at {probe.voltage:g} V (A)")
+            axes.set_ylabel(f"current at {probe.drive} (A)")
         _finish(figure, study, [])
     return figure
 

@@ -13,6 +13,7 @@ from markupsafe import Markup
 
 from circuittex.base.arrays import Floats
 from circuittex.base.atomic import write_text
+from circuittex.design import Design
 from circuittex.results.claims.table import Table, claims_table
 from circuittex.results.heating import heating
 from circuittex.results.plot import save_figures
@@ -30,6 +31,7 @@ from circuittex.results.summary import (
     agrees,
     confirmed,
     difference,
+    driven_otherwise,
     effort,
     insulated_resistances,
     network_names,
@@ -124,12 +126,15 @@ def _verdict(study: Study) -> tuple[str, list[str]]:
 
 def _states(study: Study) -> Markup:
     probes = [f"I {name} (A)" for name in _probes(study)]
-    head = ["state", "strain", *probes, "peak temperature rise (K)"]
+    driven = driven_otherwise(study.design)
+    volts = [f"U {study.design.probes[k].name} (V)" for k in driven]
+    head = ["state", "strain", *probes, *volts, "peak temperature rise (K)"]
     rows = [
         [
             record.name,
             _number(record.strain),
             *map(_number, record.currents),
+            *(_number(record.fields[k].voltage) for k in driven),
             _number(record.peak_temperature),
         ]
         for record in study.records
@@ -140,13 +145,15 @@ def _states(study: Study) -> Markup:
         forces=_forces(study),
         equilibrium=_equilibrium(study),
         heat=_heat(study),
+        ratings=_ratings(study),
+        rise=_number(study.design.electrical.rated_rise),
         effort=effort(study),
         energy=energy_section(study),
     )
 
 
 def _heat(study: Study) -> dict[str, Any]:
-    """Of the first and the last state of each loading; nothing where heat leaves at the ends alone, as in the paper."""
+    """Of the first and the last state of each loading; nothing where heat is not asked about (`_is_heater`)."""
     head = ["state", "probe", "power (W)", "W/cm²", "peak temperature rise (K)", "along the yarns (%)"]
     last = {record.loading: record for record in study.records}
     rows = [
@@ -154,8 +161,22 @@ def _heat(study: Study) -> dict[str, Any]:
         for record in last.values()
         for each in heating(study, record)
     ]
-    electrical = study.design.electrical
-    return {"head": head, "rows": rows if electrical.heat_loss or electrical.emissivity else []}
+    return {"head": head, "rows": rows if _is_heater(study.design) else []}
+
+
+def _ratings(study: Study) -> dict[str, Any]:
+    """Current, power and power for each area of the fabric, of each probe in each state."""
+    head = ["state", *(f"{name} ({unit})" for name in _probes(study) for unit in ("A", "W", "W/cm²"))]
+    rows = []
+    for record in study.records:
+        rated = [(h.rated_current, h.rated_power, h.rated_power_density) for h in heating(study, record)]
+        rows.append([record.name, *(_number(value) for each in rated for value in each)])
+    return {"head": head, "rows": rows if _is_heater(study.design) else []}
+
+
+def _is_heater(design: Design) -> bool:
+    """Whether heat leaves otherwise than at the ends alone, as in the paper, or is fed in as a current or a power."""
+    return bool(design.electrical.heat_loss or design.electrical.emissivity or driven_otherwise(design))
 
 
 def _forces(study: Study) -> dict[str, Any]:

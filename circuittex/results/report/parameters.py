@@ -11,7 +11,6 @@ from markupsafe import Markup
 
 from circuittex.design import Design, Gradient, Weave
 from circuittex.design.experiment import REST
-from circuittex.results.report.number import number
 from circuittex.results.report.template import render
 
 
@@ -82,8 +81,8 @@ def _terminals(design: Design) -> dict[str, Any]:
 
 
 def _probes(design: Design) -> dict[str, Any]:
-    rows = [[probe.name, probe.source, probe.sink, number(probe.voltage)] for probe in design.probes]
-    return _part("Probes", ["probe", "source", "sink", "voltage (V)"], rows)
+    rows = [[probe.name, probe.source, probe.sink, probe.drive] for probe in design.probes]
+    return _part("Probes", ["probe", "source", "sink", "driven by"], rows)
 
 
 def _settings(title: str, part: object, said: dict[str, str] | None = None, skip: Sequence[str] = ()) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from functools import cache
 
 UNITS = (
     *("N mm", "N/mm2", "N/mm", "N", "MPa", "1/mm", "mm2", "mm3", "mm", "g/mm3", "S/mm2", "S/mm", "S", "W/(mm2 K)"),
+    "W/mm2",
     *("W/(mm K)", "W/K", "W", "V per volt", "V per V", "V", "A", "1/K2", "1/K", "K/W", "K", "ohm2", "ohm", "s"),
     "`unit`",
 )

@@ -35,7 +35,7 @@ def band_figures(ensemble: Ensemble) -> dict[str, Figure]:
     rows: dict[str, list[Panel]] = {
         "forces": [(f"clamps at the {ENDS[s]}", "force (N)", [(f"{s}_F{c}", f"F{c}") for c in "xyz"]) for s in SIDES],
         "currents": [
-            (f"probe {probe.name}", f"current at {probe.voltage:g} V (A)", [(f"current_{probe.name}", "")])
+            (f"probe {probe.name}", f"current at {probe.drive} (A)", [(f"current_{probe.name}", "")])
             for probe in ensemble.design.probes
         ],
         "network": [

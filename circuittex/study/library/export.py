@@ -48,7 +48,7 @@ def export_library(
     ends: str = CRIMPED,
     thin: float = 0.0,
     dialects: Sequence[str] = DIALECTS,
-    rise: float = 10.0,
+    rise: float | None = None,
     combine: Sequence[str] = (),
     members: Iterable[Study] = (),
     reactive: bool = False,
@@ -57,7 +57,8 @@ def export_library(
 
     Names of sub-circuits begin with `name` and are the same for every study and state. Cells in which strain is no
     input are of `state`, the first recorded one unless named. `ends`: see `ENDS`. With `thin` > 0 there are also ports
-    with fewer resistors, whose resistances rise by at most that part. Ratings are for `rise` kelvin.
+    with fewer resistors, whose resistances rise by at most that part. Ratings are for `rise` kelvin,
+    those of the design unless given.
     Two strains, of `strain_grid.AXES`, are inputs of one part where the study has all states of a grid of them; with
     `combine`, the names of both, it is an error where it has not.
     `members` of an ensemble, `study` among them, give corners: see `reduction.corners`. With `reactive` every part
@@ -65,6 +66,7 @@ def export_library(
 
     Raises `DesignError` for an argument and `CircuitError` for a study that cannot be used.
     """
+    rise = study.design.electrical.rated_rise if rise is None else rise
     chosen = _checked(study, state, ends, thin, dialects, rise)
     if reactive and ends != CRIMPED:
         raise DesignError("reactive", reactive, f"it needs {CRIMPED} yarn ends: capacitances are those of whole yarns")
@@ -199,7 +201,7 @@ def _write_probes(folder: Path, study: Study, chosen: int) -> None:
     if not design.probes:
         return
     circuits = state_circuits(simplified(design, record.contacts), design.terminals, design.probes)
-    for probe in design.probes:
+    for probe in record.driven(design).probes:
         word = safe_name(probe.name)
         _write_ascii(folder / f"probe_{word}_free.cir", probe_netlist(design, record.name, circuits, probe))
         _write_ascii(

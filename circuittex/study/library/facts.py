@@ -9,6 +9,7 @@ import numpy as np
 from circuittex.base.arrays import Floats
 from circuittex.base.frozen import frozen
 from circuittex.electrical.network.ports import PortMatrix, port_matrix
+from circuittex.results.heating import rated_currents
 from circuittex.results.records import Study
 from circuittex.study.library.accuracy import Errors, compared
 from circuittex.study.library.bicubic import left_out
@@ -17,7 +18,6 @@ from circuittex.study.library.interpolation import without
 from circuittex.study.library.levels import CRIMPED, Levels, levels, port_matrices
 from circuittex.study.library.network import WITHIN, matrix_at, ports_network
 from circuittex.study.library.parts import Part
-from circuittex.study.library.rating import rated_currents
 from circuittex.study.library.reduction import TOLERANCES, Reduction, corners, exact, thin, tolerances
 from circuittex.study.library.resistivity import at_end, differs
 from circuittex.study.library.strain_grid import StrainGrid, grids

@@ -121,16 +121,15 @@ def _unreal(design: Design) -> str:
 def _not_driven(study: Study, record: Record) -> list[str]:
     """The probes that do not carry the current, or take the power, that the design states."""
     idle = []
-    area = fabric_area(study.design, record.gradient)
-    for probe, field in zip(study.design.probes, record.fields, strict=True):
-        current = float(field.currents[0])
-        if probe.current is not None:
-            part = current / probe.current
-        elif probe.power_density is not None:
-            part = field.voltage * current / (probe.power_density * area)
-        else:
+    for number, probe in enumerate(study.design.probes):
+        if probe.voltage:
             continue
-        if field.voltage == 1.0 and not abs(part - 1.0) < REACHED:
+        field = record.fields[number]
+        current = float(field.currents[0])
+        wanted = probe.current or 0.0
+        if probe.power_density is not None:
+            wanted = probe.power_density * fabric_area(study.design, record.gradient) / field.voltage
+        if field.voltage == 1.0 and not abs(current - wanted) < REACHED * abs(wanted):
             idle.append(f"{probe.name} ({probe.drive})")
     return idle
 

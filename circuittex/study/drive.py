@@ -1,4 +1,4 @@
-"""What drives the probes in a state: the voltage at which each carries the stated current, or takes the stated power."""
+"""What drives the probes in a state: the voltage at which each carries the current, or takes the power, stated."""
 
 from __future__ import annotations
 

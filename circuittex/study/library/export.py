@@ -57,10 +57,9 @@ def export_library(
 
     Names of sub-circuits begin with `name` and are the same for every study and state. Cells in which strain is no
     input are of `state`, the first recorded one unless named. `ends`: see `ENDS`. With `thin` > 0 there are also ports
-    with fewer resistors, whose resistances rise by at most that part. Ratings are for `rise` kelvin,
-    those of the design unless given.
-    Two strains, of `strain_grid.AXES`, are inputs of one part where the study has all states of a grid of them; with
-    `combine`, the names of both, it is an error where it has not.
+    with fewer resistors, whose resistances rise by at most that part. Ratings are for `rise` kelvin, by
+    default those of the design. Two strains, of `strain_grid.AXES`, are inputs of one part where the study has all
+    states of a grid of them; with `combine`, the names of both, it is an error where it has not.
     `members` of an ensemble, `study` among them, give corners: see `reduction.corners`. With `reactive` every part
     has capacitors between its pins and inductors behind them, of the chosen state (`electrical.network.reactance`).
 

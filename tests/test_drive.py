@@ -85,7 +85,7 @@ def alone() -> Study:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A cell whose contacts conduct, so that its resistances change with the stretch; none is merged in its netlists."""
+    """A cell whose contacts conduct, so that its resistances change with the stretch; its netlists merge none."""
     place, design = tmp_path_factory.mktemp("driven"), weave(0.01)
     all_contacts = replace(design.numerics, merge_length=0.0, snap_length=0.0, drop_fraction=0.0)
     run_study(replace(design, numerics=all_contacts), place)

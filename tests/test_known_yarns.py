@@ -21,14 +21,17 @@ from circuittex.command.exit_codes import ExitCode
 from circuittex.design import Design, Yarn, design_hash, load_design, parse_design, starter
 from circuittex.design.files import fabrics
 from circuittex.design.known_yarns import ENTRY_POINTS, FOLDERS, LONGEST, yarn_library
+from circuittex.electrical.fields import cooling_of, solve_probes
+from circuittex.results.heating import heating
 from circuittex.results.records import Study
 from circuittex.results.soundness import doubts
 from circuittex.results.summary import agrees
+from circuittex.study.drive import at_voltages
 from circuittex.study.run import run_study
 
 LIBRARY = yarn_library()
 PAGE = (Path(__file__).parents[1] / "docs" / "data_sheet.md").read_text(encoding="utf-8")
-BY_HAND, FILE, PACKAGE = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+BY_HAND, HEATER, FILE, PACKAGE = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 ROUNDING = 1e-12
 """Relative, of a few products and roots."""
 OWN = """title = "Mine"
@@ -341,6 +344,14 @@ def test_steel_heater_conducts_along_its_warp_alone() -> None:
     length = 2 * design.weave.directions[0].step
     assert record.currents[0] == pytest.approx(0.01 / (23.8e-3 * length), rel=1e-2)  # radius of three digits
     assert record.fit.kinds == ("heater warp",)
+    heater = parse_design(tomllib.loads(starter("steel_heater")) | tomllib.loads(HEATER))
+    driven = at_voltages(heater, record.contacts, record.gradient)
+    cooling = cooling_of(heater, study.mesh)
+    fields = solve_probes(record.contacts, driven.terminals, driven.probes, cooling=cooling)
+    (heat,) = heating(replace(study, design=heater), replace(record, fields=fields))
+    assert heat.power_density == pytest.approx(0.05, rel=1e-9)
+    assert f"**{heat.rise:.0f} K**" in PAGE
+    assert f"**{heat.rated_power_density:.3f} W/cm2**" in PAGE
 
 
 def test_copper_bus_feeds_what_touches_bare_copper_alone() -> None:

@@ -176,7 +176,7 @@ def doubts(study: Study, record: Record) -> tuple[Doubt, ...]:
         Doubt(
             "drive",
             float(len(idle := _not_driven(study, record))),
-            f"no current flows by which it could be driven as stated, and it is at 1 V: {', '.join(idle)}",
+            f"no voltage that there can be drives as stated, so that 1 V is applied to: {', '.join(idle)}",
         ),
         Doubt(
             "mesh",

@@ -72,6 +72,11 @@ def _heating(field: Fields, area: float, rise: float) -> Heating:
     )
 
 
+def driven_otherwise(design: Design) -> tuple[int, ...]:
+    """Numbers of the probes that are not driven by a voltage, which follows in each state and is told then."""
+    return tuple(number for number, probe in enumerate(design.probes) if not probe.voltage)
+
+
 def fabric_area(design: Design, gradient: Floats) -> float:
     """Area of the cell at an average in-plane gradient, mm2: its spans, times the determinant.
 

@@ -9,7 +9,7 @@ from circuittex.base.frozen import frozen
 from circuittex.contact.state import ContactState
 from circuittex.design import Design
 from circuittex.geometry.mesh import FibrilMesh
-from circuittex.results.heating import fabric_area
+from circuittex.results.heating import driven_otherwise, fabric_area
 from circuittex.results.records import Record, Study
 
 HOT = 300.0
@@ -121,10 +121,8 @@ def _unreal(design: Design) -> str:
 def _not_driven(study: Study, record: Record) -> list[str]:
     """The probes that do not carry the current, or take the power, that the design states."""
     idle = []
-    for number, probe in enumerate(study.design.probes):
-        if probe.voltage:
-            continue
-        field = record.fields[number]
+    for number in driven_otherwise(study.design):
+        probe, field = study.design.probes[number], record.fields[number]
         current = float(field.currents[0])
         wanted = probe.current or 0.0
         if probe.power_density is not None:

@@ -94,7 +94,7 @@ from circuittex.fit import Fit
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results.bifurcation import BranchCheck, branch_statement, current_difference, force_difference
 from circuittex.results.discretisation import ErrorEstimate
-from circuittex.results.heating import heating
+from circuittex.results.heating import driven_otherwise, heating
 from circuittex.results.records import Record, Study
 from circuittex.results.soundness import deepest_overlap, doubt_statement, doubts, surface_stress
 from circuittex.results.verification import AGREEMENT
@@ -172,11 +172,6 @@ def table(study: Study) -> str:
             *ngspice_statement(study),
         ]
     )
-
-
-def driven_otherwise(design: Design) -> tuple[int, ...]:
-    """Numbers of the probes that are not driven by a voltage, which follows in each state and is told then."""
-    return tuple(number for number, probe in enumerate(design.probes) if not probe.voltage)
 
 
 def network_names(study: Study) -> tuple[str, ...]:

@@ -70,16 +70,15 @@ def measured(way: str, yarns: int, filaments: int, per_crossing: int) -> Result:
         searches[0] += 1
         return search(*of)
 
-    before = relaxation.WORTH_A_DESCENT, relaxation.MOST_OF_A_DESCENT
+    before = relaxation.WORTH_A_DESCENT
     vars(penalty)["find_candidates"] = counted
     vars(relaxation)["WORTH_A_DESCENT"] = 0 if way == "with" else sys.maxsize
-    vars(relaxation)["MOST_OF_A_DESCENT"] = sys.maxsize
     clock = time.process_time()
     try:
         found = relaxation.relax(mesh, design, solver=solver)
     finally:
         vars(penalty)["find_candidates"] = search
-        vars(relaxation)["WORTH_A_DESCENT"], vars(relaxation)["MOST_OF_A_DESCENT"] = before
+        vars(relaxation)["WORTH_A_DESCENT"] = before
     seconds, newton = time.process_time() - clock, len(found.history) - 1
     return {
         "way": way,

@@ -29,12 +29,10 @@ from circuittex.relaxation.units import PLAIN, Units, own_units
 ROUGHLY = 1e-3
 """Tolerance of a descent with softer contacts than there are, which only leads near a minimum."""
 
-WORTH_A_DESCENT = 60_000
+WORTH_A_DESCENT = 40_000
 """Unknowns from which on a first relaxation begins with a descent by gradients. With 29,520 of them, 4 x 4 yarns of ten
-fibrils, it costs as much as Newton's method alone, with 116,640, 8 x 8 yarns, a little over half
+fibrils, it costs as much as Newton's method alone, with 50,184, 2 x 2 yarns of 34, and more a fraction
 (`benchmarks/size.py`)."""
-MOST_OF_A_DESCENT = 150_000
-"""Unknowns up to which it does: 16 x 16 yarns, 464,000, were not seen to arrive by it."""
 
 
 @frozen
@@ -125,7 +123,7 @@ def _relaxed(
     scales = fibril_scales(space, design.weave.least_pitch, largest_penalty(mesh, design.contact))
     scales = replace(scales, newtons=units.force)
 
-    large = before is None and WORTH_A_DESCENT <= space.n_dofs <= MOST_OF_A_DESCENT
+    large = before is None and space.n_dofs >= WORTH_A_DESCENT
     stride = float(mesh.radius.min()) if large else 0.0
 
     def descend(q: Floats, part: float, may_creep: bool) -> Minimum:

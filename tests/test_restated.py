@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from circuittex.base.errors import ConvergenceError, PenetrationError
 from circuittex.base.frozen import same
 from circuittex.design import ContactLaw, Design, load_design, plain_weave
+from circuittex.design.packing import Packing
 from circuittex.design.restated import restated
 from circuittex.geometry.weave import build_mesh
 from circuittex.relaxation.relax import relax
@@ -44,6 +45,30 @@ def test_a_design_at_any_scale_is_the_same_in_units_of_its_own(s: float, m: floa
     there = written(design, s, m)
     units = own_units(build_mesh(there), there)
     assert same(restated(there, units.length, units.modulus), design)
+
+
+@pytest.mark.parametrize("radius", [0.0313, 0.0339])
+def test_what_is_allowed_to_the_last_digit_is_so_in_any_units(radius: float) -> None:
+    """Each at its limit, where the last of a dozen digits of a quotient may round it beyond: two of five radii did."""
+    cell = written(plain_weave(yarns=2, rows=(1,)), radius / 0.15, 1.0)
+    pitch = round(13.3 * radius, 4)
+    design = replace(cell, weave=replace(cell.weave, pitch=pitch))
+    elements = design.numerics.elements
+    assert isinstance(elements, int)
+    numerics = replace(design.numerics, merge_length=2.0 * pitch, snap_length=2.0 * pitch / elements / 10)
+    there = replace(design, packing=Packing(phase=pitch / 4.0), numerics=numerics)
+    units = own_units(build_mesh(design), design)
+    phase = restated(there, units.length, units.modulus).packing.phase
+    assert phase == pytest.approx(pitch / 4.0 / units.length, rel=1e-11)
+
+
+def test_stiff_fibrils_with_soft_contacts_have_units_of_their_own() -> None:
+    """Of 400 GPa, as carbon, by a penalty of 0.001 N/mm2: no material is of 2e9 MPa, a number in other units may be."""
+    cell = written(plain_weave(yarns=2, rows=(1,)), 1.0, 4e4)
+    design = replace(cell, contact=ContactLaw(0.001, 0.01, 0.1))
+    units = own_units(build_mesh(design), design)
+    there = restated(design, units.length, units.modulus).weave.warp[0].materials[0]
+    assert there.youngs_modulus == pytest.approx(2e9, rel=1e-11)
 
 
 def test_forces_go_with_the_modulus_and_the_square_of_lengths() -> None:

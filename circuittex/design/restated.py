@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import fields, is_dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
+from circuittex.design.checks import store
 from circuittex.design.declaration import keys
 from circuittex.design.statement import Design
 from circuittex.design.units import newtons_and_millimetres
 
+T = TypeVar("T")
 DIGITS = 12
 """Significant digits that are kept: a quotient of decimal numbers is the decimal number that it stands for again."""
 
@@ -18,7 +21,8 @@ def restated(design: Design, length: float, modulus: float) -> Design:
 
     A key in N^a mm^b is divided by (modulus length^2)^a length^b, as its declaration says; what is of no matter for the
     mechanics of fibrils at rest, conductivities and densities, stays. Numbers of elements and contact points that
-    were 'auto' are stated.
+    were 'auto' are stated. What is allowed is not checked again: limits are about mm and MPa, and what lies exactly at
+    one may lie beyond it by the last digit in other units.
 
     >>> from circuittex.design import plain_weave
     >>> fine = restated(plain_weave(), 100.0, 1.0)
@@ -42,7 +46,7 @@ def restated(design: Design, length: float, modulus: float) -> Design:
             for field in fields(thing)
             for value in [getattr(thing, field.name)]
         }
-        return replace(thing, **changed)
+        return _with(thing, changed)
 
     def number(value: Any, unit: str) -> Any:
         newtons, millimetres = newtons_and_millimetres(unit) or (0, 0)
@@ -51,7 +55,14 @@ def restated(design: Design, length: float, modulus: float) -> Design:
         return _rounded(value / (force**newtons * length**millimetres))
 
     parts = {"weave": design.weave, "contact": design.contact, "packing": design.packing, "numerics": numerics}
-    return replace(design, **{name: other(part) for name, part in parts.items()})
+    return _with(design, {name: other(part) for name, part in parts.items()})
+
+
+def _with(thing: T, changed: dict[str, Any]) -> T:
+    """A copy with other values, which are those that were checked when `thing` was made."""
+    found = copy(thing)
+    store(found, **changed)
+    return found
 
 
 def _rounded(value: float) -> float:

@@ -172,6 +172,28 @@ def test_a_resistance_of_one_s_own_replaces_a_conductivity(name: str) -> None:
     assert ohm_per_metre(yarn) == pytest.approx(500 if size else 5.4, rel=ROUNDING)
 
 
+@pytest.mark.parametrize("order", [("sold", "other"), ("other", "sold")])
+def test_a_resistance_of_one_s_own_does_not_reach_another_yarn(order: tuple[str, str]) -> None:
+    """Both would be of one material: whichever came last decided the conductivity of both."""
+    name = "steel_316l_12um_275"
+    few = {"yarn": name, "filaments": 3}
+    tables = {"sold": few, "other": {**few, "resistance": "100 ohm/m"}}
+    design = with_yarn(tables[order[0]])
+    design["yarns"]["second"] = tables[order[1]]
+    with pytest.raises(DesignError, match=r"yarns\.second\.yarn: .* two conductivities"):
+        parse_design(design)
+    design["yarns"]["second"] = {**tables["other"], "material": "mine"}
+    design["yarns"]["conductive"] = tables["sold"]
+    steel = dict(yarn_library()[name].materials["steel"])
+    del steel["electrical_conductivity"]
+    design["materials"]["mine"] = steel
+    design["weave"]["weft"] = "second"
+    found = parse_design(design).weave
+    assert [ohm_per_metre(each[0]) for each in (found.warp, found.weft)] == pytest.approx(
+        [1e3 / (3 * pi * 0.006**2 * 1351), 100], rel=ROUNDING
+    )
+
+
 def test_a_material_of_one_s_own_needs_none_of_the_library() -> None:
     yarn = first(with_yarn({"yarn": "copper_litz_20um_10", "materials": ["fibril"] * 10}))
     assert {each.name for each in yarn.materials} == {"fibril"}

@@ -164,17 +164,20 @@ def with_library(top: Table, folder: Path) -> Table:
     library = yarn_library(*(folder / each for each in listed))
     if not isinstance(materials, Mapping) or not isinstance(yarns, Mapping):
         return Table(rest, top.field)
-    yarns, materials = dict(yarns), dict(materials)
+    yarns, materials, stated = dict(yarns), dict(materials), top.value.get("materials", {})
+    first: dict[str, tuple[str, Mapping[str, Any]]] = {}
     for label in named:
         table = Table(yarns[label], f"yarns.{label}")
         entry = choose(table.value[_NAMES_YARN], table.at(_NAMES_YARN), library)
-        stated = {key: value for key, value in table.value.items() if key != _NAMES_YARN}
-        yarns[label], given = _merged(entry, stated)
+        yarns[label], given = _merged(entry, {key: value for key, value in table.value.items() if key != _NAMES_YARN})
         listed = yarns[label].get("materials")
         used = [yarns[label].get("material"), yarns[label].get("shell"), *(listed if isinstance(listed, list) else [])]
         for key in filter(used.__contains__, given):
-            changes = Table(top.value.get("materials", {}).get(key, {}), f"materials.{key}")
-            materials[key] = {**given[key], **changes.value}
+            materials[key] = {**given[key], **Table(stated.get(key, {}), f"materials.{key}").value}
+            owner, before = first.setdefault(key, (label, materials[key]))
+            if materials[key] != before:  # one with a resistance of its own and one with the library's
+                allowed = f"with yarns.{owner} it would give {key!r} two conductivities: give one a material of its own"
+                raise refuse(table.at(_NAMES_YARN), table.value[_NAMES_YARN], allowed)
     return Table({**rest, "yarns": yarns, "materials": materials}, top.field)
 
 

@@ -21,11 +21,15 @@ from circuittex.electrical.spice.ngspice import run_deck
 from circuittex.results.records import Study
 from circuittex.study.export import simplified
 from circuittex.study.library.export import export_library
+from circuittex.study.library.network import Network
+from circuittex.study.library.temperature import coefficients
 
 pytestmark = pytest.mark.xdist_group("library_temperature")  # what its fixtures make serves one worker
 
 FIBRIL, CONTACT = (0.0039, 6e-7), (-0.0012, 2e-6)
 """tc1 and tc2 of the fibrils, about those of copper, and of the contacts, whose resistance falls."""
+FITS = [1.0, 1e-3], [0.8, 3.0], [1.2, 2.0]
+"""ohm, at 27 C, 50 K below and 50 K above."""
 PAIRS = [("warp1_minus", "warp1_plus"), ("warp1_minus", "weft2_plus"), ("weft1_minus", "warp2_plus")]
 EXACT = 1e-8
 """ngspice at 50 K: coefficients are written with 10 digits; what else it loses is its own pivoting."""
@@ -142,6 +146,36 @@ def test_one_coefficient_for_all_is_that_of_every_resistor(tmp_path: Path, monke
         assert found
         # A fit ends with some 1e-8: over 50 K, or its square.
         np.testing.assert_allclose(np.array(found, dtype=float), [FIBRIL] * len(found), rtol=0, atol=1e-9)
+
+
+def test_yarns_that_nothing_joins_have_the_coefficients_of_their_fibrils(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Crossings that do not conduct had a resistance, another one at each temperature, and no library came of it."""
+    without_pictures(monkeypatch)
+    made = warm_study(FIBRIL, CONTACT)
+    apart = [
+        replace(record, contacts=replace(record.contacts, conductance=0.0 * record.contacts.conductance))
+        for record in made.records
+    ]
+    export_library(replace(made, records=tuple(apart)), tmp_path, dialects=("ngspice",))
+    text = (tmp_path / "ngspice" / "fabric_cell.lib").read_text("ascii")
+    found = re.findall(r"^R(\S+) .* tc1=(\S+) tc2=(\S+)$", text, re.MULTILINE)
+    assert {name[:2] for name, *_ in found} == {"ry"}
+    np.testing.assert_allclose(np.array([tc for _, *tc in found], dtype=float), [FIBRIL] * len(found), atol=1e-9)
+
+
+def test_a_resistance_that_no_fit_determines_has_the_coefficients_of_the_others() -> None:
+    """One that is 3 ohm, 1e-3 ohm and 2 ohm in turn would be negative at some temperature between."""
+    ends = (("a", "b"), ("b", "c"))
+    fits = [Network(("a", "c"), ("r", "lost"), ends, np.zeros(1), 1.0 / np.array([ohm])) for ohm in FITS]
+    np.testing.assert_allclose(coefficients(*fits), [[0.004, 0.0]] * 2, atol=1e-12)
+    tame = [1.0, 1.0], [0.9, 0.9], [1.1, 1.1]
+    two = [
+        Network(("a", "c"), ("r", "lost"), ends, np.arange(2.0), 1.0 / np.array(ohm))
+        for ohm in zip(FITS, tame, strict=True)
+    ]
+    np.testing.assert_allclose(coefficients(*two), [[0.003, 0.0], [0.002, 0.0]], atol=1e-12)
 
 
 def test_a_design_without_coefficients_writes_no_word_of_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ G = sum over resistors of g d d^T, with d (P,) a resistor's drops for one volt a
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,8 +118,12 @@ def pair_errors(circuit: Circuit, matrix: PortMatrix) -> Floats:
 
 
 def match_pairs(design: Design, grouping: Groups, matrix: PortMatrix) -> Match:
-    """The values whose network has the resistances between all pairs of pins that a port matrix has."""
+    """The values whose network has the resistances between all pairs of pins that a port matrix has.
+
+    Those of crossings between yarns that nothing joins are infinite, and not determined: any that is large would do.
+    """
     wanted = resistances(matrix)
+    whole, grouping = grouping, _of_joined(grouping, matrix, np.isfinite(wanted))
     i, j = np.triu_indices(len(wanted), 1)
     known = np.isfinite(wanted[i, j]) & (wanted[i, j] > 0.0)
     i, j = i[known], j[known]
@@ -136,7 +141,41 @@ def match_pairs(design: Design, grouping: Groups, matrix: PortMatrix) -> Match:
         share = conductance[:, None] * (response[:, between[0]] - response[:, between[1]]) ** 2 / ohm
         return np.log(ohm), share
 
-    return _matched(design, grouping, target, model, "the resistances between the pins", unit)
+    data = "the resistances between the pins"
+    return _with_open(whole, grouping, _matched(design, grouping, target, model, data, unit), data)
+
+
+def _of_joined(grouping: Groups, matrix: PortMatrix, joined: NDArray[np.bool_]) -> Groups:
+    """The groups without those of crossings none of whose pairs of yarns has pins that are `joined` (P, P)."""
+    place, beside = {name: k for k, name in enumerate(matrix.ports)}, len(matrix.ports)
+    passes = np.pad(joined, (0, 1))  # the last one for a yarn that is no pin
+    warp, weft = (
+        [place.get(yarn_end_name(f"{kind}{k + 1}", -1), beside) for k in range(count)]
+        for kind, count in zip(("warp", "weft"), grouping.crossing_group.shape, strict=True)
+    )
+    group, there = grouping.crossing_group, passes[np.ix_(warp, weft)]
+    kept = np.unique(group[there & (group >= 0)])
+    if len(kept) == len(grouping.crossings):
+        return grouping
+    numbers = np.full(len(grouping.crossings) + 1, -1)  # the last one for the group -1
+    numbers[kept] = np.arange(len(kept))
+    yarns = len(grouping.yarns)
+    start = np.concatenate([grouping.start[:yarns], grouping.start[yarns + kept]])
+    names = tuple(grouping.crossings[k] for k in kept.tolist())
+    return replace(grouping, crossings=names, crossing_group=numbers[group], start=start)
+
+
+def _with_open(whole: Groups, joined: Groups, match: Match, data: str) -> Match:
+    """The values of all groups: those of crossings that are not among the `joined` ones are infinite."""
+    if whole is joined or not len(match.found):
+        return match
+    yarns = len(whole.yarns)
+    there = np.array([True] * yarns + [name in joined.crossings for name in whole.crossings])
+    found, lost = np.full(len(there), np.inf), np.ones(len(there), dtype=bool)
+    found[there], lost[there] = match.found, match.lost
+    names = [name for name in whole.crossings if name not in joined.crossings]
+    reasons = tuple(f"Rc of {name} is not determined: {data} do not tell it from other values" for name in names)
+    return Match(found, lost, match.misfit, match.reasons + reasons)
 
 
 def match_probes(design: Design, grouping: Groups, conductance: Floats) -> Match:

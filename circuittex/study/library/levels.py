@@ -16,6 +16,7 @@ from circuittex.electrical.network.matching import groups, match_pairs, spread
 from circuittex.electrical.network.ports import PortMatrix, port_matrix
 from circuittex.results.records import Record, Study
 from circuittex.study.export import simplified
+from circuittex.study.library.network import FLOOR
 from circuittex.study.library.resistivity import Factor, as_stated, scaled
 
 CRIMPED, FREE = "crimped", "free"
@@ -122,4 +123,7 @@ def _fitted(study: Study, ports: Sequence[PortMatrix]) -> tuple[Floats, Floats] 
         if not match.solved:
             return f"state {record.name}: {'; '.join(match.reasons) or 'no network comes close to it'}"
         found.append(spread(grouping, match.found))
-    return np.array([Ry for Ry, _ in found]), np.array([Rc for _, Rc in found])
+    across = np.array([Rc for _, Rc in found])
+    # What opens in some states only keeps a resistance there, as between the pins (`ports_network`).
+    largest = np.where(np.isfinite(across), across, 0.0).max(axis=0)
+    return np.array([Ry for Ry, _ in found]), np.where((largest > 0.0) & np.isinf(across), largest / FLOOR, across)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.electrical.network.ports import PortMatrix, resistances
@@ -20,10 +21,15 @@ DIGITS = 10
 """Of a coefficient: a resistance at 50 K is right to 1e-11."""
 
 
+LEAST = 0.01
+"""Part of a resistance that its parabola leaves at least."""
+
+
 def coefficients(network: Network, cold: Network, warm: Network) -> Floats:
     """(R, 2) tc1 and tc2 of each resistor: the parabola through it at 27 C and `STEP` below and above.
 
-    Where strain is an input, the mean over its states.
+    Where strain is an input, the mean over its states. A parabola that nearly vanishes on the way is of a fitted
+    resistance that nothing determines, and that is another at each temperature: it has the mean of all others.
 
     >>> g = np.array([[0.5]])
     >>> line = [Network(("a", "b"), ("r",), (("a", "b"),), np.zeros(1), g / f) for f in (1.0, 0.805, 1.205)]
@@ -31,9 +37,18 @@ def coefficients(network: Network, cold: Network, warm: Network) -> Floats:
     [[0.004, 2e-06]]
     """
     down, up = network.conductance / cold.conductance, network.conductance / warm.conductance
-    tc1 = ((up - down) / (2.0 * STEP)).mean(axis=0).tolist()
-    tc2 = ((up + down - 2.0) / (2.0 * STEP**2)).mean(axis=0).tolist()
-    return np.array([[_rounded(a, 1e-13), _rounded(b, 1e-15)] for a, b in zip(tc1, tc2, strict=True)]).reshape(-1, 2)
+    tc1, tc2 = (up - down) / (2.0 * STEP), (up + down - 2.0) / (2.0 * STEP**2)
+    inside = np.abs(tc1) < 2.0 * tc2 * STEP  # its least, 1 - tc1^2 / (4 tc2)
+    known = ~(inside & (tc1**2 > 4.0 * (1.0 - LEAST) * tc2))
+    pairs = zip(_over_states(tc1, known).tolist(), _over_states(tc2, known).tolist(), strict=True)
+    return np.array([[_rounded(a, 1e-13), _rounded(b, 1e-15)] for a, b in pairs]).reshape(-1, 2)
+
+
+def _over_states(values: Floats, known: NDArray[np.bool_]) -> Floats:
+    """(R,) mean of values (K, R) over the states in which they are known, that of all resistors where none is."""
+    count = known.sum(axis=0)
+    own = np.where(known, values, 0.0).sum(axis=0) / np.maximum(count, 1)
+    return np.where(count > 0, own, own[count > 0].mean() if count.any() else 0.0)
 
 
 def _rounded(value: float, noise: float) -> float:

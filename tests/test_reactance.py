@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigvalsh
 
 from circuittex.base.errors import DesignError
+from circuittex.base.frozen import same
 from circuittex.design import plain_weave
 from circuittex.electrical.network.reactance import (
     EPSILON0,
@@ -133,6 +134,19 @@ def test_the_outline_is_that_of_the_fibrils() -> None:
     r = mesh.position.reshape(4, 10, -1, 3)
     level = np.concatenate([r[..., :2], (r - r.mean(axis=1, keepdims=True))[..., 2:]], axis=-1)
     np.testing.assert_allclose(yarn_lines(mesh, level.reshape(-1, 3)).radius, (1.2 + 0.9) / 4, rtol=1e-12)
+
+
+def test_fibrils_that_insulate_are_no_part_of_the_conductor() -> None:
+    """One copper wire beside nine of nylon is that wire, wherever it lies in its yarn."""
+    mesh = build_mesh(plain_weave(yarns=2, rows=(3, 4, 3)))
+    wire = 4
+    alone = replace(mesh, electrical_conductivity=np.where(np.arange(mesh.n_fibrils) % 10 == wire, 10.0, 0.0))
+    known = yarn_lines(alone, mesh.position)
+    np.testing.assert_array_equal(known.place, mesh.position.reshape(mesh.n_fibrils, -1, 3)[wire::10])
+    np.testing.assert_allclose(known.radius, 0.15, rtol=1e-12)
+    np.testing.assert_allclose(known.mean_distance, np.exp(-0.25) * 0.15, rtol=1e-12)  # of a round wire
+    nothing = replace(mesh, electrical_conductivity=np.zeros(mesh.n_fibrils))
+    assert same(yarn_lines(nothing, mesh.position), yarn_lines(mesh, mesh.position))
 
 
 @pytest.fixture(scope="module")

@@ -1,9 +1,10 @@
 """Capacitances between yarns and inductances of yarns to first order, from where their fibrils lie.
 
-A yarn is a bundle: its fibrils are at one potential and share its current alike. For the electric field outside, its
-outline counts: an ellipse as wide and as high as the bundle, whose round equivalent has the mean of the half-axes as
-its radius (exactly, for a cylinder alone: the map that takes the ellipse to a circle leaves the field far away as it
-is). Neither skin effect nor what lies beyond the cell is in these numbers, nor the narrow gap of surfaces that touch.
+A yarn is a bundle: its conducting fibrils are at one potential and share its current alike. For the electric field
+outside, its outline counts: an ellipse as wide and as high as the bundle, whose round equivalent has the mean of the
+half-axes as its radius (exactly, for a cylinder alone: the map that takes the ellipse to a circle leaves the field
+far away as it is). Neither skin effect nor what lies beyond the cell is in these numbers, nor the narrow gap of
+surfaces that touch.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ class YarnLines:
     """Y yarns as bundles along their centre lines, at K places."""
 
     place: Floats
-    """(Y, K, 3) middle of the fibrils, mm."""
+    """(Y, K, 3) middle of the conductors, mm."""
     radius: Floats
     """(Y,) of the round equivalent of the outline, mm."""
     mean_distance: Floats
@@ -36,7 +37,7 @@ class YarnLines:
 
 
 def yarn_lines(mesh: FibrilMesh, r: Floats) -> YarnLines:
-    """The yarns of fibrils with nodes r (N, 3), mm, all with as many nodes.
+    """The yarns of fibrils with nodes r (N, 3), mm, all with as many nodes; those that conduct, or all if none do.
 
     >>> from circuittex.design import plain_weave
     >>> from circuittex.geometry.weave import build_mesh
@@ -45,7 +46,10 @@ def yarn_lines(mesh: FibrilMesh, r: Floats) -> YarnLines:
     [0.15, 0.15, 0.15, 0.15]
     """
     lines = r.reshape(mesh.n_fibrils, -1, 3)
-    found = [_bundle(lines[mesh.yarn == k], mesh.radius[mesh.yarn == k]) for k in range(len(mesh.yarn_names))]
+    conducts = mesh.electrical_conductivity > 0.0
+    counts = conducts | (np.bincount(mesh.yarn, conducts)[mesh.yarn] == 0)
+    of_yarn = [counts & (mesh.yarn == k) for k in range(len(mesh.yarn_names))]
+    found = [_bundle(lines[own], mesh.radius[own]) for own in of_yarn]
     place, radius, distance = zip(*found, strict=True)
     return YarnLines(np.array(place), np.array(radius), np.array(distance))
 

@@ -16,8 +16,10 @@ from circuittex.base.frozen import same
 from circuittex.contact.extract import contacts_of
 from circuittex.design import Design, Packing, Yarn, plain_weave
 from circuittex.electrical.fields import solve_probes
-from circuittex.electrical.network.circuit import build_circuit
+from circuittex.electrical.network.circuit import build_circuit, yarn_end_terminals
 from circuittex.electrical.network.nodal import solve_nodal
+from circuittex.electrical.network.ports import port_matrix
+from circuittex.fit import fit_network
 from circuittex.geometry.permutation import permuted
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
@@ -156,6 +158,24 @@ def test_a_yarn_resists_along_its_natural_length() -> None:
     circuit = build_circuit(contacts, [t for t in design.terminals if t.name in (probe.source, probe.sink)])
     nodal = solve_nodal(circuit, {probe.source: probe.voltage, probe.sink: 0.0})
     assert abs(nodal.port_current).max() == pytest.approx(probe.voltage / ohm, rel=1e-12)
+
+
+def test_one_kind_as_long_as_two_paths_has_a_resistance_in_either_direction() -> None:
+    """Insulated yarns of the lengths of both waves, and the network that is fitted to the cell by default."""
+    design = cell("path", amplitude=0.25)
+    design = replace(
+        design,
+        weave=replace(design.weave, weft_amplitude=0.06),
+        contact=replace(design.contact, conductivity=0.0),
+    )
+    mesh = build_mesh(design)
+    contacts = contacts_of(design, mesh, initial_configuration(mesh))
+    matrix = port_matrix(build_circuit(contacts, yarn_end_terminals(mesh)))
+    fit = fit_network(np.zeros(len(design.probes)), design, matrix)
+    ohm = [woven_length(each) / 2 / (10.0 * AREA) for each in (0.25, 0.06)]
+    assert fit.kinds == ("conductive warp", "conductive weft")
+    assert fit.kind_resistance == pytest.approx(ohm, rel=1e-9)
+    assert ohm[0] > 1.03 * ohm[1]
 
 
 def test_one_kind_with_crimp_leaves_the_other_as_it_was() -> None:

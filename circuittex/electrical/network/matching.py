@@ -19,6 +19,7 @@ from circuittex.base.arrays import Floats, Ints
 from circuittex.base.binary import power_of_two
 from circuittex.base.frozen import frozen
 from circuittex.design import Design
+from circuittex.design.yarn import PATH
 from circuittex.electrical.network.circuit import Circuit, reduced_circuit, yarn_end_name
 from circuittex.electrical.network.ports import PortMatrix, port_matrix, resistances
 
@@ -77,7 +78,9 @@ def groups(design: Design, *, each_crossing: bool) -> Groups:
     weave = design.weave
     n, m = len(weave.warp), len(weave.weft)
     warp, weft = weave.directions
-    apart = each_crossing or warp.step != weft.step  # segments of one kind have one length, or one in each direction
+    # Segments of one kind have one length, or one in each direction: of the step, or of the path.
+    as_path = any(yarn.crimp == PATH for yarn in weave.yarns) and warp.amplitude != weft.amplitude
+    apart = each_crossing or warp.step != weft.step or as_path
     names, segments = [], []
     for direction in (warp, weft):
         for yarn in direction.yarns:

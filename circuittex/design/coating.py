@@ -32,6 +32,20 @@ def mixed(core: float, shell: float, share: float) -> float:
     return core + (shell - core) * share
 
 
+def current_share(core: object, shell: object, share: float) -> float:
+    """Part of the current along a fibril that a shell with this share of the section carries; the share itself where
+    neither conducts.
+
+    >>> from circuittex.design import Material
+    >>> copper, silver = (Material("metal", 1e5, 0.3, 0.01, sigma, 0.4) for sigma in (50.0, 150.0))
+    >>> current_share(copper, silver, 0.25)
+    0.5
+    """
+    own = getattr(shell, SIGMA) * share
+    both = mixed(getattr(core, SIGMA), getattr(shell, SIGMA), share)
+    return float(own / both) if both > 0.0 else share
+
+
 def coated(core: object, shell: object, share: float) -> dict[str, float]:
     """The numbers of the material that is along its axis as a core and a shell, two others, of this share are together.
 
@@ -50,7 +64,7 @@ def coated(core: object, shell: object, share: float) -> dict[str, float]:
         return mixed(getattr(core, key) ** power, getattr(shell, key) ** power, part)
 
     found = {key: mean(key, share) for key in SUMMED}
-    part = getattr(shell, SIGMA) * share / found[SIGMA] if found[SIGMA] > 0.0 else share
+    part = current_share(core, shell, share)
     tc1 = mean("tc1", part)
     spread = mean("tc1", part, 2) - tc1**2
     return found | {"tc1": tc1, "tc2": mean("tc2", part) - spread, "tolerance": mean("tolerance", part)}

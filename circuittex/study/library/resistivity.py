@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from circuittex.contact.state import ContactState
-from circuittex.design import ContactLaw, Design, Material
+from circuittex.design import ContactLaw, Design, Material, Yarn
+from circuittex.design.coating import current_share, shell_share
 from circuittex.design.contact import ContactProperties
 
 Factor = Callable[[Material | ContactProperties], float]
@@ -51,7 +52,7 @@ def scaled(design: Design, contacts: ContactState, factor: Factor) -> ContactSta
         return contacts
     surfaces = [each for yarn in design.weave.yarns for each in yarn.surfaces]
     mesh = contacts.mesh
-    along = np.array([factor(each) for each in _materials(design)])
+    along = np.array([each for yarn in design.weave.yarns for each in _of_fibrils(yarn, factor)])
     across = np.array(
         [
             factor(_between(design.contact, surfaces[a], surfaces[b]))
@@ -63,6 +64,15 @@ def scaled(design: Design, contacts: ContactState, factor: Factor) -> ContactSta
         mesh=replace(mesh, electrical_conductivity=mesh.electrical_conductivity / along),
         conductance=contacts.conductance / across,
     )
+
+
+def _of_fibrils(yarn: Yarn, factor: Factor) -> list[float]:
+    """The factor of each fibril of a yarn; of a coated one that of core and shell side by side, each with its own."""
+    if yarn.shell is None or not yarn.coated:
+        return [factor(each) for each in yarn.materials]
+    share, shell = shell_share(yarn.radius, yarn.shell_thickness), yarn.shell
+    in_shell = {core: current_share(core, shell, share) for core in dict.fromkeys(yarn.materials)}
+    return [1.0 / ((1.0 - in_shell[core]) / factor(core) + in_shell[core] / factor(shell)) for core in yarn.materials]
 
 
 def _between(law: ContactLaw, one: Material, other: Material) -> ContactProperties:

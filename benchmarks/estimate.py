@@ -4,7 +4,8 @@
 
 Weaves of N x N yarns of ten fibrils, stretched and sheared in so many steps each, and whole designs, each in a process
 of its own: the words before the first state, the seconds from there until the last state is recorded, and the largest
-memory that the process and those it started had together, looked at five times a second.
+memory that the process and those it started had together, looked at five times a second. The last column is what it
+takes to find these words, in parts of the whole run.
 """
 
 from __future__ import annotations
@@ -28,9 +29,11 @@ from measure import Table, arguments, publish
 
 from circuittex.design import Design, load_design, plain_weave, shear, uniaxial
 from circuittex.geometry.weave import build_mesh
-from circuittex.study.run import run_study
+from circuittex.results.records import Study
+from circuittex.study import run
+from circuittex.study.forecast import Forecast
 
-HEAD = ["design", "unknowns", "states", "workers", "said before", "took s", "peak GB", "measuring s", "of the run %"]
+HEAD = ["design", "unknowns", "states", "workers", "said", "took s", "took GB", "estimate s", "of the run %"]
 
 
 def weave(yarns: int, steps: int) -> Design:
@@ -51,14 +54,26 @@ def measured(design: Design, workers: int) -> dict[str, Any]:
             peak[0] = max(peak[0], tree_memory())
 
     begin = time.monotonic()
+    spent: list[float] = []
+    real = run.foresee
+
+    def timed(study: Study, workers: int) -> Forecast | None:
+        clock = time.monotonic()
+        try:
+            return real(study, workers)
+        finally:
+            spent.append(time.monotonic() - clock)
+
+    run.foresee = timed
     watcher = threading.Thread(target=look)
     watcher.start()
     try:
         with tempfile.TemporaryDirectory() as folder:
-            run_study(
+            run.run_study(
                 design, folder, workers=workers, progress=lambda text: said.append((time.monotonic() - begin, text))
             )
     finally:
+        run.foresee = real
         over.set()
         watcher.join()
     opening, words = next((at, text.strip()) for at, text in said if "; " in text and text.endswith("\n"))
@@ -66,7 +81,7 @@ def measured(design: Design, workers: int) -> dict[str, Any]:
     states = int(words.partition("; ")[2].partition(" ")[0])
     found = {"words": words.partition(";")[0], "states": states, "seconds": end - opening, "memory": peak[0] / 1e9}
     unknowns = 9 * build_mesh(design).n_nodes
-    return {"name": design.name, "unknowns": unknowns, "workers": workers, "before": opening, "all": end, **found}
+    return {"name": design.name, "unknowns": unknowns, "workers": workers, "before": sum(spent), "all": end, **found}
 
 
 def tree_memory() -> float:

@@ -46,9 +46,9 @@ PROCESS, OF_ENTRIES, OF_FACTOR = 290e6, 17 * 8, 2 * 8
 """Bytes that a process needs at its most: for itself, for each entry of the pattern at the start, and for each value of
 its factor then. Entries come to be up to 1.1 times as many, values 1.0 to 1.9 times, as contacts come; arrays live
 beside one another. Peaks of eight designs of 7,560 to 463,680 unknowns were 0.76 to 1.19 times what this gives."""
-LEAST_ENTRIES, LEAST_FILL = 166, 4
-"""Entries of a node that touches nothing, and values of the factor for each entry: 4 to 11 were counted. By these a
-design that is far too large is known before its matrices are built."""
+LEAST_ENTRIES, LEAST_FILL = 126, 3
+"""Entries of a node that touches nothing, of linear elements, and values of the factor for each entry: 3.6 to 11 were
+counted. By these a design that is far too large is known before its matrices are built."""
 TRUSTED = 1.5
 """Times the available memory from which on a run is refused; below, the estimate may be to blame."""
 

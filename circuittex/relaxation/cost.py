@@ -16,7 +16,7 @@ from circuittex.mech.configuration import Configuration
 from circuittex.mech.coupled import Coupled
 from circuittex.mech.minimise import LARGEST_SHIFT
 from circuittex.mech.multifrontal import analysed
-from circuittex.mech.pattern import count_entries, diagonal
+from circuittex.mech.pattern import Pattern, count_entries, diagonal
 from circuittex.mech.scales import fibril_scales
 from circuittex.mech.system import System
 from circuittex.mech.terms import ForceTerm
@@ -40,8 +40,6 @@ class Cost:
 
     size: Size
     """How large its matrices are at the start."""
-    operations: float
-    """floating-point operations of a factorisation."""
     assembly: float
     """s for one assembly with search and pattern."""
     analysis: float
@@ -91,11 +89,7 @@ def measured_cost(
     clock()
     pattern, _, gradient = system.assemble(q)
     assembled = clock()
-    free = np.ones(len(q))
-    free[space.fixed] = 0.0
-    stiffness, metric = (free * values[diagonal(pattern)] for values in (system.data, system.metric))
-    shift = LARGEST_SHIFT * float((stiffness[free > 0] / metric[free > 0]).max())  # positive whatever the contacts do
-    values, coupled = system.matrix(shift, 1.0), Coupled()
+    values, coupled = system.matrix(_largest_shift(system, pattern), 1.0), Coupled()
     clock()
     coupled.renew(pattern, values)
     analysis = analysed(pattern, coupled)
@@ -118,13 +112,18 @@ def measured_cost(
         gradient_in = clock()
     return Cost(
         size=size,
-        operations=analysis.least,
         assembly=searched + assembled,
         analysis=ordered,
         factorisation=factorised,
         gradient=gradient_in,
         solution=solved,
     )
+
+
+def _largest_shift(system: System, pattern: Pattern) -> float:
+    """The largest shift that Newton's method would try: with it the tangent is positive, whatever contacts do."""
+    stiffness, metric = (np.delete(values[diagonal(pattern)], system.fixed) for values in (system.data, system.metric))
+    return LARGEST_SHIFT * float((stiffness / metric).max())
 
 
 class _Clock:

@@ -1,6 +1,6 @@
 """What is said before a study begins against what it takes then.
 
-    python benchmarks/estimate.py [--sizes 2 4 8] [--steps 4] [--workers 2] [DESIGN.toml ...]
+    python benchmarks/estimate.py [DESIGN.toml ...] [--sizes 2 4 8] [--steps 4] [--workers 2]
 
 Weaves of N x N yarns of ten fibrils, stretched and sheared in so many steps each, and whole designs, each in a process
 of its own: the words before the first state, the seconds from there until the last state is recorded, and the largest

@@ -34,10 +34,10 @@ GRADIENTS, BESIDE = 400, 10
 where a descent comes first: 423 and 414 of them were counted."""
 TRIED = 1.2
 """What an iteration takes, in parts of one of each of its parts at the start: several factors may be tried, steps are
-searched, and contacts come. 0.7 to 2 were measured."""
+searched, and contacts come. 0.6 to 2 were measured."""
 RECORD = 5.0
-"""What it takes to record a state, fields, circuits and their verification, in iterations: 3 to 5 for the paper's
-yarns, 15 for yarns whose elements have many contact points."""
+"""What it takes to record a state, fields, circuits and their verification, in iterations: 2 to 5 for the paper's
+yarns, 15 for yarns whose elements have many contact points, 1 for single wires."""
 SHARED = 0.5
 """A relaxation on a part of the cores takes longer by the inverse of that part to this power: 1.2 to 1.8 times on one
 core of two."""

@@ -23,6 +23,7 @@ SCRIPTS = [
     "cholesky",
     "compile",
     "dolfinx_beam",
+    "estimate",
     "invariance",
     "kills",
     "library",
@@ -275,6 +276,17 @@ def test_scaling_measures_a_size_and_compares_two() -> None:
     assert shares.head == ["part", "1 x 1", "2 x 2"]
     costs, _ = scaling.tables([small, {**large, "residual": 1e-3}])  # cut short: its seconds compare with nothing
     assert costs.rows[1][-3] == ""
+
+
+def test_estimate_measures_a_study_beside_its_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    estimate = script("estimate")
+    result = estimate.measured(replace(tiny(), probes=(), terminals=()), workers=1)
+    assert (result["words"], result["states"]) == ("under a minute", 1)
+    assert 0 <= result["before"] < result["seconds"] < result["all"]
+    assert result["memory"] > 0.05  # GB: Python with NumPy and SciPy alone
+    table = estimate.table([result])
+    assert len(table.rows[0]) == len(estimate.HEAD)
+    assert len(estimate.weave(2, 3).loading) == 2
 
 
 def test_algorithm_1_comes_to_rest_in_the_equilibrium() -> None:

@@ -47,6 +47,10 @@ class PenetrationError(ConvergenceError):
     """Fibrils that contact does not keep apart: through one another, or too deep for its law to mean anything."""
 
 
+class SizeError(CircuittexError, RuntimeError):
+    """A design that is too large for this machine; on another one it need not be."""
+
+
 class CircuitError(CircuittexError, ValueError):
     """A circuit that has no unique solution or cannot be written."""
 

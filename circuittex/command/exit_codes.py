@@ -12,6 +12,7 @@ from circuittex.base.errors import (
     FolderError,
     NgspiceError,
     NgspiceUnavailableError,
+    SizeError,
     StoreError,
     WorkerError,
 )
@@ -53,6 +54,7 @@ MEANINGS: dict[ExitCode, str] = {
 
 OF_ERRORS: tuple[tuple[type[CircuittexError | OSError], ExitCode], ...] = (
     (DesignError, ExitCode.DESIGN),
+    (SizeError, ExitCode.DESIGN),
     (CircuitError, ExitCode.DESIGN),
     (ConvergenceError, ExitCode.NO_EQUILIBRIUM),
     (NgspiceUnavailableError, ExitCode.NOT_CHECKED),

@@ -10,7 +10,7 @@ from circuittex.base.arrays import Floats
 from circuittex.mech.coupled import Coupled
 from circuittex.mech.pattern import DOFS, Pattern
 from circuittex.solvers.cholesky import Cholesky, Solve
-from circuittex.solvers.fronts import Blocks, Entries, analyse
+from circuittex.solvers.fronts import Analysis, Blocks, Entries, analyse
 
 POSITION = 3
 """Unknowns of a node's position; the others are its directors'."""
@@ -40,10 +40,15 @@ class MultifrontalSolver:
         if self._coupled.renew(pattern, data):
             last = self._cholesky
             analysis = None if last is None else last.analysis
-            entries = Entries(pattern.indptr, pattern.indices, self._coupled.entries)
-            self._cholesky = Cholesky(analyse(blocks(pattern, self._coupled.pairs), entries, analysis), last)
+            self._cholesky = Cholesky(analysed(pattern, self._coupled, analysis), last)
         assert self._cholesky is not None, "no pairs were renewed"
         return self._cholesky.factor(data[self._coupled.entries])
+
+
+def analysed(pattern: Pattern, coupled: Coupled, last: Analysis | None = None) -> Analysis:
+    """The fronts of a matrix with this pattern and these couplings; see `analyse`."""
+    entries = Entries(pattern.indptr, pattern.indices, coupled.entries)
+    return analyse(blocks(pattern, coupled.pairs), entries, last)
 
 
 def blocks(pattern: Pattern, coupled: NDArray[np.bool_]) -> Blocks:

@@ -79,6 +79,18 @@ def build_pattern(n: int, full: Ints, point: Ints, position: Floats | None = Non
     )
 
 
+def count_entries(n: int, full: Ints, point: Ints) -> int:
+    """How many entries `build_pattern` would make of the same pairs.
+
+    >>> n, full, point = 3, np.array([[0, 1], [1, 0]]), np.array([[1, 0], [1, 2]])
+    >>> count_entries(n, full, point), build_pattern(n, full, point).nnz
+    (225, 225)
+    """
+    full_key = distinct(_keys(n, full))
+    of_points = len(distinct(np.concatenate([full_key, _keys(n, point)]))) - len(full_key)
+    return DOFS * (DOFS + 1) // 2 * n + DOFS * DOFS * len(full_key) + 9 * of_points
+
+
 def distinct(keys: Ints) -> Ints:
     """The different ones among numbers of at least 0, rising: sorted ten times faster than np.unique hashes them.
 

@@ -64,15 +64,21 @@ class System:
     def factor(self, solver: LinearSolver, shift: float, softening: float) -> Solve | None:
         """The shifted tangent's factor, None where it is not positive definite.
 
-        Its roots would be rounded otherwise at another scale, so what is factorised has no unit.
+        Its roots would be rounded otherwise at another scale, so what is factorised has no unit (`matrix`).
         """
+        assert self.pattern is not None
+        solve = solver.factor(self.pattern, self.matrix(shift, softening))
+        unit, energy = self.scales.binary_unit, self.scales.energy
+        return None if solve is None else lambda force: unit * solve(unit * force / energy)
+
+    def matrix(self, shift: float, softening: float) -> Floats:
+        """(nnz,) the shifted tangent, without a unit, of the free unknowns; ones for the others."""
         assert self.pattern is not None
         values = np.empty(self.pattern.nnz)
         _shifted(self.data, softening, self.softening, shift, self.metric, self.scaling, values)
         values[self.held] = 0.0
         values[diagonal(self.pattern)[self.fixed]] = 1.0
-        solve, unit, energy = solver.factor(self.pattern, values), self.scales.binary_unit, self.scales.energy
-        return None if solve is None else lambda force: unit * solve(unit * force / energy)
+        return values
 
     def limits(self, q: Floats, tolerance: float, force_tolerance: float) -> Floats:
         """(F,) the free force, N, up to which each fibril is in equilibrium: see `minimise`."""

@@ -55,6 +55,11 @@ class Equilibrium:
     """(Newton iterations + 1, 4) residual N, potential N mm, shift (`minimise`), step length, of the last descent."""
 
 
+def begins_with_gradients(n_dofs: int) -> bool:
+    """Whether a first relaxation of so many unknowns begins with a descent by gradients."""
+    return n_dofs >= WORTH_A_DESCENT
+
+
 def force_terms(mesh: FibrilMesh, design: Design, free_edges: str = "") -> tuple[BeamSpace, Beam, PenaltyContact]:
     """The space of the fibrils and the two force terms, elasticity and contact, that a design asks for."""
     numerics = design.numerics
@@ -123,7 +128,7 @@ def _relaxed(
     scales = fibril_scales(space, design.weave.least_pitch, largest_penalty(mesh, design.contact))
     scales = replace(scales, newtons=units.force)
 
-    large = before is None and space.n_dofs >= WORTH_A_DESCENT
+    large = before is None and begins_with_gradients(space.n_dofs)
     stride = float(mesh.radius.min()) if large else 0.0
 
     def descend(q: Floats, part: float, may_creep: bool) -> Minimum:

@@ -33,6 +33,7 @@ from circuittex.study.folder import (
     write_numbers,
     write_state,
 )
+from circuittex.study.forecast import Forecast, foresee
 from circuittex.study.plan import RELAXED, plan
 from circuittex.study.record import Recorded, reach
 from circuittex.study.rest import Rest
@@ -71,7 +72,8 @@ def run_study(
     is reached once more, with the fibrils in another order, to see whether round-off chooses its branch
     (`check_branch`), as far as it has not been checked. Both are kept one by one as the states are.
 
-    Raises `ConvergenceError` where equilibria are not found, once the other paths are done; `FolderError` where the
+    What all will take is said before the first state (`foresee`). Raises `SizeError` where there is not the memory for
+    it, `ConvergenceError` where equilibria are not found, once the other paths are done; `FolderError` where the
     folder cannot be used; `StoreError` where it cannot be written, on a full disk for example.
     """
     say = progress if progress is not None else _say_nothing
@@ -96,13 +98,16 @@ def run_study(
         return [*estimated, *(branch_checks(found, solver) if branches else [])]
 
     if out is None:
-        study = _compute(study, count, solver, say, _with)
+        foreseen = foresee(study, count)
+        _rest(study, count, say, foreseen)
+        study = _compute(study, foreseen.workers if foreseen else count, solver, say, _with)
         return _examine(study, jobs(study), count, say, with_examination)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     with locked(folder):
+        foreseen = foresee(study, count) if fresh else None  # what is too large removes nothing
         study = open_study(folder, study, fresh=fresh)
-        return _in_folder(folder, study, count, solver, say, jobs)
+        return _in_folder(folder, study, count, solver, say, jobs, foreseen)
 
 
 def _in_folder(
@@ -112,13 +117,14 @@ def _in_folder(
     solver: Callable[[], LinearSolver],
     say: Say,
     jobs: Callable[[Study], Sequence[Job]],
+    foreseen: Forecast | None,
 ) -> Study:
     """Complete the study and everything in its folder."""
     loading = {step.name: step.loading for step in plan(study.design)}
-    known = {record.name for record in study.records}
-    if known:
-        say(f"{len(known)} of {len(loading)} states are there already\n")
-    rest = Rest(Counter(loading[name] for name in loading if name not in known), len(loading), workers, say)
+    if study.records:
+        say(f"{len(study.records)} of {len(loading)} states are there already\n")
+    foreseen = foreseen or foresee(study, workers)
+    rest = _rest(study, workers, say, foreseen)
 
     def keep(so_far: Study, recorded: Recorded) -> Study:
         record = recorded.record
@@ -129,7 +135,7 @@ def _in_folder(
         return so_far
 
     try:
-        study = _compute(study, workers, solver, rest, keep)
+        study = _compute(study, foreseen.workers if foreseen else workers, solver, rest, keep)
         study = _examine(study, jobs(study), workers, say, partial(keep_examination, folder))
         if needs_report(folder):
             say("figures and report")
@@ -139,6 +145,16 @@ def _in_folder(
             f"{error}; {rest.kept} of {rest.total} states are kept in {folder}, and the same call goes on from there"
         ) from error
     return study
+
+
+def _rest(study: Study, workers: int, say: Say, foreseen: Forecast | None) -> Rest:
+    """What there is to do, once it has been said."""
+    known, steps = {record.name for record in study.records}, plan(study.design)
+    left = Counter(step.loading for step in steps if step.name not in known)
+    rest = Rest(left, len(steps), workers, say, foreseen=foreseen)
+    if left:
+        say(f"{rest.opening()}\n")
+    return rest
 
 
 def _compute(study: Study, workers: int, solver: Callable[[], LinearSolver], say: Say, keep: Keep) -> Study:

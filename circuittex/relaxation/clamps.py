@@ -1,4 +1,4 @@
-"""Clamps that slide along their yarns under a given force, as unknowns of the relaxation; and what they come to."""
+"""Clamps that slide along their yarns under a given force, as unknowns of the relaxation."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from circuittex.base.arrays import Floats
 from circuittex.base.frozen import frozen
 from circuittex.design import Design
 from circuittex.geometry.mesh import FibrilMesh
-from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.load import DeadLoad
 from circuittex.mech.motions import Motions
 from circuittex.mech.pattern import DOFS
@@ -53,29 +53,3 @@ def sliding(mesh: FibrilMesh, design: Design, axes: str, gradient: Floats = REST
     origin = initial_configuration(mesh).x.ravel()
     unknown, motion, part = (np.concatenate(column) for column in zip(*rows, strict=True))
     return Sliding(Motions(unknown, motion, part, np.array(leaders)), DeadLoad(force, origin))
-
-
-def tensions(mesh: FibrilMesh, reaction: Floats, gradient: Floats = REST) -> Floats:
-    """(Y,) tension of each yarn, N: the mean of its two clamps' forces `reaction` (N, 3) along F e_k (`sliding`)."""
-    along = np.moveaxis(gradient / np.hypot(*gradient), 0, 1)[mesh.yarn_axis[mesh.yarn]]
-    pull = reaction[mesh.end_nodes(+1), :2] - reaction[mesh.end_nodes(-1), :2]
-    each: Floats = np.bincount(mesh.yarn, weights=(pull * along).sum(axis=1) / 2, minlength=len(mesh.yarn_axis))
-    return each
-
-
-def extensions(mesh: FibrilMesh, configuration: Configuration) -> Floats:
-    """(Y,) strain of the distance between the two ends of each yarn, in the plane, since the mesh was laid out.
-
-    >>> from circuittex.design import plain_weave
-    >>> from circuittex.geometry.weave import build_mesh
-    >>> from circuittex.mech.configuration import initial_configuration
-    >>> mesh = build_mesh(plain_weave(yarns=2))
-    >>> extensions(mesh, initial_configuration(mesh)).tolist()
-    [0.0, 0.0, 0.0, 0.0]
-    """
-
-    def distance(r: Floats) -> Floats:
-        apart = r[mesh.end_nodes(+1), :2] - r[mesh.end_nodes(-1), :2]
-        return np.hypot(*(np.bincount(mesh.yarn, weights=part, minlength=len(mesh.yarn_axis)) for part in apart.T))
-
-    return distance(configuration.r) / distance(mesh.position) - 1.0

@@ -125,9 +125,7 @@ def estimates(study: Study, solver: Callable[[], LinearSolver]) -> list[Job]:
     return [(record.name, estimate_error, (*arguments, record, solver)) for record in without_estimate(study)]
 
 
-def _repeat(
-    design: Design, mesh: FibrilMesh, record: Record, loading: Loading | None, solver: LinearSolver
-) -> _Repeat:
+def _repeat(design: Design, mesh: FibrilMesh, record: Record, loading: Loading | None, solver: LinearSolver) -> _Repeat:
     """Relax the state with the numerics of `design`, and measure what comes out."""
     other, state = build_mesh(design), record.configuration
     try:

@@ -10,7 +10,7 @@ from circuittex.base.version import __version__
 
 _HOMES = {
     "design": (
-        *("ContactLaw", "Design", "Electrical", "Loading", "Material", "MaterialPair", "Numerics", "Packing"),
+        *("Clamps", "ContactLaw", "Design", "Electrical", "Loading", "Material", "MaterialPair", "Numerics", "Packing"),
         *("Probe", "Terminal", "Weave", "Yarn", "biaxial", "design_hash", "equal_steps", "load_design", "load_unload"),
         *("fibril_conductivity", "fibril_radius", "hexagonal_rows", "parse_design", "plain_weave", "shear", "starter"),
         *("coated_radius", "shell_thickness", "strain_grid", "touching_amplitude", "uniaxial", "yarn_library"),
@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from circuittex.contact.merge import simplify as simplify
     from circuittex.contact.places import contact_places as contact_places
     from circuittex.contact.state import ContactState as ContactState
+    from circuittex.design import Clamps as Clamps
     from circuittex.design import ContactLaw as ContactLaw
     from circuittex.design import Design as Design
     from circuittex.design import Electrical as Electrical

@@ -17,6 +17,7 @@ from circuittex.base.arrays import Floats, Ints
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.beam import Beam
 from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.mech.load import DeadLoad
 from circuittex.mech.minimise import Minimum, minimise
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import DOFS, Pattern, build_pattern
@@ -63,33 +64,6 @@ def turned(angle: float, axis: int) -> Floats:
     return R
 
 
-class DeadLoad:
-    """The potential -f.q of constant nodal forces f (n_dofs,)."""
-
-    def __init__(self, force: Floats) -> None:
-        self.force = force
-
-    def prepare(self, q: Floats) -> bool:
-        return False
-
-    def pairs(self) -> tuple[Ints, Ints]:
-        return np.empty((0, 2), dtype=np.int64), np.empty((0, 2), dtype=np.int64)
-
-    def energy(self, q: Floats) -> float:
-        return float(-self.force @ q)
-
-    def add_gradient(self, q: Floats, gradient: Floats) -> float:
-        gradient -= self.force
-        return self.energy(q)
-
-    def longest(self, q: Floats, direction: Floats) -> float:
-        return 1.0
-
-    def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
-        gradient -= self.force
-        return self.energy(q)
-
-
 def dofs(space: BeamSpace, node: int, rows: Sequence[int] = (0, 1, 2)) -> Ints:
     """The unknowns of a node: all components of `rows`, 0 for r, 1 for g1, 2 for g2."""
     return np.concatenate([DOFS * np.arange(space.mesh.n_nodes)[node] + 3 * row + np.arange(3) for row in rows])
@@ -99,7 +73,7 @@ def tip_load(space: BeamSpace, force: ArrayLike) -> DeadLoad:
     """A dead load on the last node."""
     f = np.zeros(space.n_dofs)
     f[dofs(space, -1, [0])] = force
-    return DeadLoad(f)
+    return DeadLoad(f, np.zeros(space.n_dofs))
 
 
 def rest(

@@ -122,18 +122,19 @@ def test_a_variant_without_equilibrium_is_named(cell: Cell) -> None:
     assert np.isnan(found.moved).all()
 
 
-@pytest.mark.parametrize(("loading", "expected"), [("", ""), ("held", ""), ("strip", "y")])
+@pytest.mark.parametrize(("loading", "expected"), [("", ("", "")), ("held", ("", "x")), ("strip", ("y", "x"))])
 def test_the_clamps_are_those_of_the_states_loading(
-    loading: str, expected: str, cell: Cell, monkeypatch: pytest.MonkeyPatch
+    loading: str, expected: tuple[str, str], cell: Cell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     design, mesh, record = cell
     design = replace(design, loading=(uniaxial("held", (0.1,)), uniaxial("strip", (0.1,), free="y")))
-    seen = []
+    record, seen = replace(record, gradient=np.diag([1.1, 1.0])), []
 
     def refuse(
-        mesh: FibrilMesh, design: Design, start: Configuration, *, free_edges: str, solver: object
+        mesh: FibrilMesh, design: Design, start: Configuration, *, free_edges: str, gripped: str, **others: object
     ) -> Equilibrium:
-        seen.append(free_edges)
+        seen.append((free_edges, gripped))
+        assert others["gradient"] is record.gradient
         raise ConvergenceError("not wanted")
 
     monkeypatch.setattr(module, "relax", refuse)

@@ -1,5 +1,6 @@
 """What the user states: a frozen, validated `Design`, from TOML, from a mapping, or from Python."""
 
+from circuittex.design.clamps import Clamps
 from circuittex.design.contact import HERTZ, ContactLaw, MaterialPair
 from circuittex.design.experiment import (
     Gradient,
@@ -30,6 +31,7 @@ from circuittex.design.yarn import Material, Yarn
 
 __all__ = [
     "HERTZ",
+    "Clamps",
     "ContactLaw",
     "Design",
     "Electrical",

@@ -8,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 
 from circuittex.design.checks import refuse
+from circuittex.design.clamps import Clamps
 from circuittex.design.contact import ContactLaw
 from circuittex.design.declaration import starter_lines
 from circuittex.design.packing import Packing
@@ -17,7 +18,7 @@ from circuittex.design.toml_file import read_toml
 from circuittex.design.weave import Weave
 from circuittex.design.yarn import Material, Yarn
 
-DECLARED: tuple[type, ...] = (Material, Yarn, Weave, ContactLaw, Electrical, Numerics, Packing)
+DECLARED: tuple[type, ...] = (Material, Yarn, Weave, ContactLaw, Electrical, Numerics, Packing, Clamps)
 """The parts of a design whose keys are declared beside their fields, in the order of the starter design."""
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from circuittex.design.checks import is_name, name, one_of, real, refuse, truth, whole
+from circuittex.design.clamps import Clamps
 from circuittex.design.contact import ContactLaw, MaterialPair
 from circuittex.design.declaration import keys, read
 from circuittex.design.experiment import (
@@ -67,6 +68,7 @@ def read_design(mapping: object, folder: Path) -> Design:
             "electrical",
             "numerics",
             "packing",
+            "clamps",
         ),
     )
     version = top.get("format", f"format = {FORMAT} states the layout of the file")
@@ -87,6 +89,7 @@ def read_design(mapping: object, folder: Path) -> Design:
         electrical=Electrical(**read(Electrical, Table(top.value.get("electrical", {}), "electrical"))),
         numerics=Numerics(**read(Numerics, Table(top.value.get("numerics", {}), "numerics"))),
         packing=Packing(**read(Packing, Table(top.value.get("packing", {}), "packing"))),
+        clamps=Clamps(**read(Clamps, Table(top.value.get("clamps", {}), "clamps"))),
     )
 
 

@@ -54,7 +54,7 @@ def restated(design: Design, length: float, modulus: float) -> Design:
             return value
         return _rounded(value / (force**newtons * length**millimetres))
 
-    parts = {"weave": design.weave, "contact": design.contact, "packing": design.packing, "numerics": numerics}
+    parts = {name: getattr(design, name) for name in ("weave", "contact", "packing", "clamps")} | {"numerics": numerics}
     return _with(design, {name: other(part) for name, part in parts.items()})
 
 

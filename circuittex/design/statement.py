@@ -8,6 +8,7 @@ from dataclasses import field, fields, is_dataclass
 
 from circuittex.base.frozen import frozen, same
 from circuittex.design.checks import distinct, instance, instances, refuse, store, title
+from circuittex.design.clamps import Clamps, check_clamps
 from circuittex.design.contact import ContactLaw
 from circuittex.design.declaration import check, choice, count, flag, number, relative
 from circuittex.design.experiment import Loading
@@ -286,12 +287,14 @@ class Design:
     """Choices of the discretisation and of the solver."""
     packing: Packing = Packing()
     """Random departures from the regular packing."""
+    clamps: Clamps = Clamps()
+    """What holds the ends of the yarns."""
 
     def __post_init__(self) -> None:
         title(self.name, "name")
         for key, one in (
             *(("weave", Weave), ("contact", ContactLaw), ("electrical", Electrical)),
-            *(("numerics", Numerics), ("packing", Packing)),
+            *(("numerics", Numerics), ("packing", Packing), ("clamps", Clamps)),
         ):
             instance(getattr(self, key), key, one)
         for key, each in (("loading", Loading), ("terminals", Terminal), ("probes", Probe)):
@@ -304,6 +307,7 @@ class Design:
         self._check_size()
         self._check_lengths()
         self._check_packing()
+        check_clamps(self.clamps, self.weave, self.loading)
         self._check_pairs()
         check_terminals(self.terminals, self.weave)
         check_probes(self.probes, self.terminals, self.weave)

@@ -55,18 +55,17 @@ def descend(
     where no step lowers the potential any more, or where one would press fibrils through one another: Newton's method
     has the last word on all of these. No step moves a node by more than `stride`, mm.
     """
-    scales, free = system.scales, np.ones(system.n)
-    free[system.fixed] = 0.0
+    scales = system.scales
     pairs: Pairs = deque(maxlen=REMEMBERED)
     solve, shift, age, most = None, SHIFT, 0, stride
     for iteration in range(MOST_ITERATIONS):
         if solve is None or age >= LASTS:
             pattern, energy, gradient = system.assemble(q)
-            solve, shift = _factor(system, solver, pattern, free, max(SHIFT, shift / 16))
+            solve, shift = _factor(system, solver, pattern, max(SHIFT, shift / 16))
             age, allowed = 0, system.limits(q, *limits)
             if solve is None or not np.isfinite(energy):
                 return q, iteration
-        force = free * gradient
+        force = system.free_force(gradient)
         left = scales.forces(force)
         if report is not None:
             report(iteration, scales.newtons * float(left.max()))
@@ -85,7 +84,7 @@ def descend(
             continue
         moved = step * _longest(direction)
         most = min(stride, 2 * max(most, moved)) if step == first else moved
-        change, turned = step * direction, free * (steeper - gradient)
+        change, turned = step * direction, system.free_force(steeper - gradient)
         curvature = _dot(change, turned)
         if curvature > -CURVED * step * _dot(force, direction):
             pairs.append((change, turned, curvature))
@@ -93,12 +92,10 @@ def descend(
     return q, MOST_ITERATIONS
 
 
-def _factor(
-    system: System, solver: LinearSolver, pattern: Pattern, free: Floats, shift: float
-) -> tuple[Solve | None, float]:
+def _factor(system: System, solver: LinearSolver, pattern: Pattern, shift: float) -> tuple[Solve | None, float]:
     """The factor with the first of `shift`, 4 `shift`, ... that makes it positive, None if none does; and that one."""
     stiffness, metric = (values[diagonal(pattern)] for values in (system.data, system.metric))
-    largest = LARGEST_SHIFT * float((free * stiffness / metric).max())
+    largest = LARGEST_SHIFT * float((stiffness / metric)[system.free].max())
     while shift <= largest:
         solve = system.factor(solver, shift, SOFTENING)
         if solve is not None:

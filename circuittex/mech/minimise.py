@@ -13,13 +13,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.errors import ConvergenceError, CreepingError, PenetrationError
 from circuittex.base.frozen import frozen
 from circuittex.mech.descent import descend
 from circuittex.mech.linear import LinearSolver, Solve
+from circuittex.mech.motions import Motions
 from circuittex.mech.pattern import Pattern, diagonal, multiply
 from circuittex.mech.scales import Scales
 from circuittex.mech.system import System
@@ -84,6 +84,7 @@ def minimise(
     *,
     scales: Scales,
     fixed: Ints,
+    motions: Motions | None = None,
     solver: LinearSolver,
     before: Floats | None = None,
     tolerance: float = 2e-5,
@@ -95,8 +96,9 @@ def minimise(
 ) -> Minimum:
     """The minimum of the terms' total potential that a descent from q (n_dofs,) reaches.
 
-    `fixed` are the prescribed unknowns, kept as they are in q; where q was moved from the minimum `before`, the descent
-    starts from what that predicts (`predict`); `report` is told of every iteration and its largest free force, N.
+    `fixed` are the prescribed unknowns, kept as they are in q but for what `motions` do to them; where q was moved from
+    the minimum `before`, the descent starts from what that predicts (`predict`); `report` is told of every iteration
+    and its largest free force, N.
 
     On each fibril `tolerance` bounds the largest free force, in parts of the largest force with which one of the terms
     acts on a node of it, or round-off does; `force_tolerance` (N) does so where that allows more, or alone where the
@@ -109,21 +111,20 @@ def minimise(
     unconverged state is never returned. `CreepingError` where its steps are short and it may not creep,
     `PenetrationError` where a term cannot keep apart what it should.
     """
-    system = System(terms, scales, fixed, len(q))
+    system = System(terms, scales, fixed, len(q), motions=motions)
     if before is not None:
         q = predict(system, solver, before, q)
     shift, place, refused, step, history = FIRST_SHIFT, 0, False, 1.0, []
-    free_dofs = np.ones(len(q), dtype=bool)
-    free_dofs[fixed] = False
     cheap = 0
     if stride > 0.0:
         q, cheap = descend(system, solver, q, stride=stride, limits=(tolerance, force_tolerance), report=report)
     for iteration in range(max_iterations + 1):
         pattern, energy, gradient = system.assemble(q)
         if iteration == 0:
-            stiffness, metric = (values[diagonal(pattern)][free_dofs] for values in (system.data, system.metric))
+            stiffness, metric = (values[diagonal(pattern)][system.free] for values in (system.data, system.metric))
             system.largest_shift = LARGEST_SHIFT * float((stiffness / metric).max())
-        left, largest = scales.forces(np.where(free_dofs, gradient, 0.0)), float(scales.forces(gradient).max())
+        force = system.free_force(gradient)
+        left, largest = scales.forces(force), float(scales.forces(gradient).max())
         residual, limits = float(left.max()), system.limits(q, tolerance, force_tolerance)
         history.append((residual, energy, shift, step))
         if report is not None:
@@ -144,11 +145,10 @@ def minimise(
         shift, place, solve = _positive(system, solver, shift, fractions, history)
         refused = SOFTENING[place] != fractions[0]
         if shift > FIRST_SHIFT and residual < SADDLE * largest:
-            lower = _escape(system, pattern, solve, q, energy, free_dofs)
+            lower = _escape(system, pattern, solve, q, energy)
             if lower is not None:
                 q, step, shift = lower, 1.0, FIRST_SHIFT
                 continue
-        force = np.where(free_dofs, gradient, 0.0)
         direction = solve(-force)
         slope = float(force @ direction)
         try:
@@ -184,8 +184,7 @@ def predict(system: System, solver: LinearSolver, q: Floats, moved: Floats) -> F
     if system.longest(q, moved - q) < 1.0:
         raise PenetrationError("the motion of the clamps would carry fibrils through one another")
     pattern, _, _ = system.assemble(q)
-    force = multiply(pattern, system.data + system.softening, moved - q)
-    force[system.fixed] = 0.0
+    force = system.free_force(multiply(pattern, system.data + system.softening, moved - q))
     solve = system.factor(solver, FIRST_SHIFT, 1.0)
     if solve is None:
         return moved
@@ -215,18 +214,16 @@ def _positive(
     raise ConvergenceError("the tangent stays indefinite under any shift", np.array(history))
 
 
-def _escape(
-    system: System, pattern: Pattern, solve: Solve, q: Floats, energy: float, free_dofs: NDArray[np.bool_]
-) -> Floats | None:
+def _escape(system: System, pattern: Pattern, solve: Solve, q: Floats, energy: float) -> Floats | None:
     """A lower point along the mode of the lowest curvature, found by inverse iteration with the shifted factor; None
     where there is none within sight.
 
     Of the two senses the one that leads lower is taken; the step doubles for as long as that pays.
     """
     unit = system.scales.unit
-    mode = np.where(free_dofs, unit * np.random.default_rng(0).standard_normal(len(q)), 0.0)
+    mode = np.where(system.free, unit * np.random.default_rng(0).standard_normal(len(q)), 0.0)
     for _ in range(INVERSE_ITERATIONS):
-        mode = np.where(free_dofs, solve(np.where(free_dofs, multiply(pattern, system.metric, mode), 0.0)), 0.0)
+        mode = solve(system.free_force(multiply(pattern, system.metric, mode)))
         mode /= np.abs(mode / unit).max()
     best, lowest = None, energy
     for sense in (-1.0, 1.0):

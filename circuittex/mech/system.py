@@ -7,10 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import compiled
 from circuittex.mech.linear import LinearSolver, Solve
+from circuittex.mech.motions import Motions
 from circuittex.mech.pattern import DOFS, Pattern, build_pattern, diagonal
 from circuittex.mech.scales import Scales
 from circuittex.mech.terms import ForceTerm
@@ -35,6 +38,20 @@ class System:
     forces: Floats = field(default_factory=lambda: np.empty(0))
     largest_shift: float = 0.0
     held: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    motions: Motions | None = None
+    free: NDArray[np.bool_] = field(init=False)
+    """(n,) whether an unknown is not prescribed."""
+
+    def __post_init__(self) -> None:
+        self.free = np.ones(self.n, dtype=bool)
+        self.free[self.fixed] = False
+
+    def free_force(self, gradient: Floats) -> Floats:
+        """(n,) the gradient over what may move (`Motions`): zero at prescribed unknowns, but for leaders of motions."""
+        force = np.where(self.free, gradient, 0.0)
+        if self.motions is not None:
+            force[self.motions.leader] = self.motions.forces(gradient)
+        return force
 
     def assemble(self, q: Floats) -> tuple[Pattern, float, Floats]:
         changed = [term.prepare(q) for term in self.terms]
@@ -56,9 +73,7 @@ class System:
         rows = np.repeat(np.arange(self.n), np.diff(pattern.indptr))
         unit = self.scales.binary_unit
         self.scaling = unit[rows] * unit[pattern.indices] / self.scales.energy
-        is_fixed = np.zeros(self.n, dtype=bool)
-        is_fixed[self.fixed] = True
-        self.held = np.flatnonzero(is_fixed[rows] | is_fixed[pattern.indices])
+        self.held = np.flatnonzero(~(self.free[rows] & self.free[pattern.indices]))
         return pattern
 
     def factor(self, solver: LinearSolver, shift: float, softening: float) -> Solve | None:
@@ -68,16 +83,24 @@ class System:
         """
         assert self.pattern is not None
         solve = solver.factor(self.pattern, self.matrix(shift, softening))
+        if solve is not None and self.motions is not None:  # of positions alone: in these units they are what they were
+            whole = self._whole(shift, softening), self.pattern.indices, self.pattern.indptr
+            solve = self.motions.solve(solve, sp.csr_array(whole, shape=(self.n, self.n)), self.free)
         unit, energy = self.scales.binary_unit, self.scales.energy
         return None if solve is None else lambda force: unit * solve(unit * force / energy)
 
     def matrix(self, shift: float, softening: float) -> Floats:
         """(nnz,) the shifted tangent, without a unit, of the free unknowns; ones for the others."""
         assert self.pattern is not None
-        values = np.empty(self.pattern.nnz)
-        _shifted(self.data, softening, self.softening, shift, self.metric, self.scaling, values)
+        values = self._whole(shift, softening)
         values[self.held] = 0.0
         values[diagonal(self.pattern)[self.fixed]] = 1.0
+        return values
+
+    def _whole(self, shift: float, softening: float) -> Floats:
+        assert self.pattern is not None
+        values = np.empty(self.pattern.nnz)
+        _shifted(self.data, softening, self.softening, shift, self.metric, self.scaling, values)
         return values
 
     def limits(self, q: Floats, tolerance: float, force_tolerance: float) -> Floats:

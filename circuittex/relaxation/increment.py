@@ -41,6 +41,7 @@ def advance(
     after: Floats,
     *,
     free_edges: str = "",
+    gripped: str = "",
     solver: LinearSolver | None = None,
     report: Callable[[int, float], None] | None = None,
     say: Callable[[str], None] | None = None,
@@ -50,8 +51,9 @@ def advance(
     An increment that does not converge within the design's `max_iterations`, or leads fibrils through one another or
     round an end, is made in two halves, these in halves again where they must be, down to `SMALLEST`; `say` is told.
     Between the ends the gradient is F = before + t (after - before): a straight line, which for the small increments
-    of a path differs little from any other. The ends of yarns along `free_edges`, 'x' or 'y', are not held (`relax`);
-    `report` is told of every iteration.
+    of a path differs little from any other. The ends of yarns along `free_edges`, 'x' or 'y', are not held, and
+    those along the axes `gripped` move as F says even if the design gives a force for them (`relax`); `report` is told
+    of every iteration.
 
     Raises `ConvergenceError`, with the history of the last try, where the smallest part does not converge.
     """
@@ -60,7 +62,17 @@ def advance(
         target = after if done + size == 1 else before + float(done + size) * (after - before)
         try:
             start = move(now, gradient, target)
-            equilibrium = relax(mesh, design, start, before=now, free_edges=free_edges, solver=solver, report=report)
+            equilibrium = relax(
+                mesh,
+                design,
+                start,
+                before=now,
+                gradient=target,
+                free_edges=free_edges,
+                gripped=gripped,
+                solver=solver,
+                report=report,
+            )
             check_sides(mesh, design, equilibrium.configuration.r, target, free_edges, equilibrium.history)
         except ConvergenceError as error:
             iterations += max(0, len(error.history) - 1)

@@ -23,6 +23,8 @@ from circuittex.mech.minimise import Minimum, minimise
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.scales import fibril_scales
 from circuittex.mech.space import BeamSpace, beam_space
+from circuittex.mech.terms import ForceTerm
+from circuittex.relaxation.clamps import REST, sliding
 from circuittex.relaxation.continuation import continued
 from circuittex.relaxation.units import PLAIN, Units, own_units
 
@@ -76,31 +78,39 @@ def relax(
     start: Configuration | None = None,
     *,
     before: Configuration | None = None,
+    gradient: Floats = REST,
     free_edges: str = "",
+    gripped: str = "",
     solver: LinearSolver | None = None,
     report: Callable[[int, float], None] | None = None,
 ) -> Equilibrium:
-    """The equilibrium that descent from `start` (by default the initial weave) reaches, ends held as there.
+    """The equilibrium that descent from `start` (by default the initial weave) reaches, ends held as there or under the
+    design's clamp forces.
 
     Where `start` was moved from the equilibrium `before`, the descent starts from what that predicts. The
-    ends of yarns along `free_edges`, 'x' or 'y', are not held. From the initial weave of the design the descent
-    is made in units of its own fibrils (`own_units`).
+    ends of yarns along `free_edges`, 'x' or 'y', are not held, those along the axes `gripped` stay in place even if the
+    design gives a force for them; the others slide as the average deformation `gradient` (2, 2) of the start directs
+    (`sliding`). From the initial weave of the design the descent is made in units of its own fibrils (`own_units`).
 
     Raises `ConvergenceError` with the history where it is not reached.
     """
     woven, solver = initial_configuration(mesh), solver if solver is not None else MultifrontalSolver()
     start, units = start if start is not None else woven, own_units(mesh, design)
     regular = before is None and same(start, woven) and same(mesh, build_mesh(design))
+    ends = gradient, free_edges, "".join(axis for axis in "xy" if axis not in gripped + free_edges)
     if not regular or units == PLAIN:
-        return _relaxed(mesh, design, start, before, free_edges, solver, report, PLAIN)
+        return _relaxed(mesh, design, start, before, ends, solver, report, PLAIN)
     own = restated(design, units.length, units.modulus)
     there = build_mesh(own)
     try:
-        found = _relaxed(there, own, initial_configuration(there), None, free_edges, solver, report, units)
+        found = _relaxed(there, own, initial_configuration(there), None, ends, solver, report, units)
     except ConvergenceError as error:
         error.history = units.history(error.history)
         raise
-    configuration = units.configuration(found.configuration, woven, beam_space(mesh, free_edges).fixed)
+    fixed, moving = beam_space(mesh, free_edges).fixed, sliding(mesh, design, ends[2], gradient)
+    if moving is not None:
+        fixed = np.setdiff1d(fixed, moving.motions.unknown)
+    configuration = units.configuration(found.configuration, woven, fixed)
     return Equilibrium(
         configuration=configuration,
         reaction=found.reaction * units.force,
@@ -117,13 +127,19 @@ def _relaxed(
     design: Design,
     start: Configuration,
     before: Configuration | None,
-    free_edges: str,
+    ends: tuple[Floats, str, str],
     solver: LinearSolver,
     report: Callable[[int, float], None] | None,
     units: Units,
 ) -> Equilibrium:
-    """The same in the units that mesh and design are in; `units` is what those are, for messages."""
+    """The same in the units that mesh and design are in; `units` is what those are, for messages.
+
+    `ends` are the average gradient, the free edges and the axes along which clamps may slide.
+    """
+    gradient, free_edges, slack = ends
     space, beam, contact = force_terms(mesh, design, free_edges)
+    moving = sliding(mesh, design, slack, gradient)
+    terms: list[ForceTerm] = [beam, contact] if moving is None else [beam, contact, moving.load]
     contact.modulus, moved, numerics = units.modulus, before is not None and not same(before, start), design.numerics
     scales = fibril_scales(space, design.weave.least_pitch, largest_penalty(mesh, design.contact))
     scales = replace(scales, newtons=units.force)
@@ -134,10 +150,11 @@ def _relaxed(
     def descend(q: Floats, part: float, may_creep: bool) -> Minimum:
         contact.part, true = part, part == 1.0
         return minimise(
-            [beam, contact],
+            terms,
             q,
             scales=scales,
             fixed=space.fixed,
+            motions=None if moving is None else moving.motions,
             solver=solver,
             before=space.vector(before) if before is not None and moved else None,
             tolerance=numerics.relative_tolerance if true else ROUGHLY,
@@ -150,7 +167,7 @@ def _relaxed(
 
     q = space.vector(start)
     minimum = descend(q, 1.0, True) if before is not None else continued(descend, q)
-    return Equilibrium(
+    found = Equilibrium(
         configuration=space.configuration(minimum.q),
         reaction=space.configuration(minimum.gradient).r,
         section_force=beam.section_force(minimum.q),
@@ -159,6 +176,11 @@ def _relaxed(
         iterations=minimum.iterations,
         history=minimum.history,
     )
+    if moving is None:
+        return found
+    load = moving.load  # of which the minimum's potential has the energy, and the clamps have the force
+    reaction = space.configuration(minimum.gradient + load.force).r
+    return replace(found, reaction=reaction, energy=found.energy - load.energy(minimum.q))
 
 
 def move(configuration: Configuration, before: Floats, after: Floats) -> Configuration:

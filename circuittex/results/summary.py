@@ -24,6 +24,8 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
     ``clamp_force_N``
         ``x``: total force of the clamps on the +x ends of the warp; ``y``: on the +y ends of the weft; three
         components each [40, 41]
+    ``tension_N``, ``extension``
+        of each yarn, warp first: the mean of its two clamps' forces along it, and the strain of their distance
     ``stored_energy_N_mm``
         elastic and contact energy
     ``clamp_work_N_mm``, ``stored_energy_change_N_mm``, ``energy_loss_N_mm``
@@ -93,6 +95,7 @@ from circuittex.design import Design
 from circuittex.fit import Fit
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results.bifurcation import BranchCheck, branch_statement, current_difference, force_difference
+from circuittex.results.clamps import clamp_statement, extensions, tensions
 from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.heating import driven_otherwise, heating
 from circuittex.results.records import Record, Study
@@ -165,6 +168,7 @@ def table(study: Study) -> str:
             *lines,
             "",
             *effort(study),
+            *clamp_statement(study),
             *branch_statement(study.branches),
             *warnings,
             *network_statement(study),
@@ -332,6 +336,8 @@ def _state(study: Study, record: Record, step: EnergyBalance | None) -> dict[str
         "newton_iterations": record.iterations,
         "parts": record.parts,
         "clamp_force_N": _by_axis(record.clamp_force),
+        "tension_N": tensions(study.mesh, record.reaction, record.gradient),
+        "extension": extensions(study.mesh, record.configuration),
         "stored_energy_N_mm": record.energy,
         "clamp_work_N_mm": None if step is None else step.work.item(),
         "stored_energy_change_N_mm": None if step is None else step.stored.item(),

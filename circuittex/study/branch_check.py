@@ -110,4 +110,7 @@ def _settle(
     if tolerance == 0.0:
         raise ConvergenceError("the clamps carry no force that the residual could be measured by")
     sharp = replace(design, numerics=replace(design.numerics, tolerance=f"{tolerance!r} N"))
-    return outcome_of(sharp, mesh, relax(mesh, sharp, state, free_edges=step.free_edges, solver=solver))
+    found = relax(
+        mesh, sharp, state, gradient=step.after, free_edges=step.free_edges, gripped=step.gripped, solver=solver
+    )
+    return outcome_of(sharp, mesh, found)

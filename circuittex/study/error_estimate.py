@@ -12,11 +12,11 @@ from circuittex.base.arrays import Floats
 from circuittex.base.errors import ConvergenceError, DesignError
 from circuittex.base.frozen import frozen
 from circuittex.base.workers import Job
-from circuittex.design import Design
+from circuittex.design import Design, Loading
+from circuittex.design.clamps import gripped
 from circuittex.fit import network_names
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
-from circuittex.mech.configuration import Configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.relaxation.relax import relax
@@ -89,12 +89,12 @@ def estimate_error(
     Raises `DesignError` as `variants` does.
     """
     design = record.driven(design)  # errors of currents at the same voltages, where a current is stated as well
-    free_edges = next((loading.free for loading in design.loading if loading.name == record.loading), "")
+    loading = next((loading for loading in design.loading if loading.name == record.loading), None)
     repeats = []
     for words, other in zip(VARIANTS, variants(design), strict=True):
         if say is not None:
             say(f"{record.name}: error estimate, {words}")
-        repeats.append(_repeat(other, mesh, record.configuration, free_edges, solver()))
+        repeats.append(_repeat(other, mesh, record, loading, solver()))
     own = _values(record.outcome)
     rows = zip(_names(design), own, *(repeat.values for repeat in repeats), strict=True)
     elements, points = design.resolution.elements, design.resolution.contact_points
@@ -125,11 +125,19 @@ def estimates(study: Study, solver: Callable[[], LinearSolver]) -> list[Job]:
     return [(record.name, estimate_error, (*arguments, record, solver)) for record in without_estimate(study)]
 
 
-def _repeat(design: Design, mesh: FibrilMesh, state: Configuration, free_edges: str, solver: LinearSolver) -> _Repeat:
+def _repeat(design: Design, mesh: FibrilMesh, record: Record, loading: Loading | None, solver: LinearSolver) -> _Repeat:
     """Relax the state with the numerics of `design`, and measure what comes out."""
-    other = build_mesh(design)
+    other, state = build_mesh(design), record.configuration
     try:
-        found = relax(other, design, transfer(state, mesh, other), free_edges=free_edges, solver=solver)
+        found = relax(
+            other,
+            design,
+            transfer(state, mesh, other),
+            gradient=record.gradient,
+            free_edges=loading.free if loading else "",
+            gripped=gripped(loading) if loading else "",
+            solver=solver,
+        )
     except ConvergenceError as error:
         return _Repeat(np.full(len(_names(design)), nan), nan, str(error))
     back = transfer(found.configuration, other, mesh)

@@ -10,6 +10,7 @@ import numpy as np
 from circuittex.base.arrays import Floats
 from circuittex.base.frozen import frozen
 from circuittex.design import Design, Loading
+from circuittex.design.clamps import gripped
 from circuittex.design.grid import starting_state
 from circuittex.study.export import state_word
 
@@ -35,6 +36,8 @@ class Step:
     """(2, 2) its own average deformation gradient."""
     free_edges: str
     """Edges that are not held: 'x', 'y' or none."""
+    gripped: str = ""
+    """Axes along which the loading moves the clamps, whatever their force."""
 
 
 def plan(design: Design) -> tuple[Step, ...]:
@@ -52,7 +55,7 @@ def plan(design: Design) -> tuple[Step, ...]:
         previous, before = (every[place[0]][place[1]] if place else RELAXED), np.array(loading.start)
         for name, strain, gradient in zip(names, loading.strains, loading.gradients, strict=True):
             after = np.array(gradient)
-            steps.append(Step(name, previous, loading.name, strain, before, after, loading.free))
+            steps.append(Step(name, previous, loading.name, strain, before, after, loading.free, gripped(loading)))
             previous, before = name, after
     return tuple(steps)
 

@@ -62,6 +62,7 @@ def reach(
             step.before,
             step.after,
             free_edges=step.free_edges,
+            gripped=step.gripped,
             solver=solver(),
             report=report,
             say=lambda text: say(f"{step.name}: {text}\n"),

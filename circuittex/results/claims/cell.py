@@ -47,7 +47,7 @@ def parameter_set(design: Design) -> str | None:
     """The parameter set whose cell the design states, or None where it is not the paper's cell.
 
     Names, loadings, probes and numerics are free, and whether the contacts' Joule heat counts; weave, yarns,
-    packing, materials, contact law and law of conduction are not.
+    packing, clamps, materials, contact law and law of conduction are not.
 
     >>> parameter_set(plain_weave("paper-table")), parameter_set(plain_weave(yarns=2))
     ('paper-table', None)
@@ -57,6 +57,7 @@ def parameter_set(design: Design) -> str | None:
         pairs = (
             (design.contact, paper.contact),
             (design.packing, paper.packing),
+            (design.clamps, paper.clamps),
             (design.electrical.conduction, paper.electrical.conduction),
             (_nameless(design.weave), _nameless(paper.weave)),
         )

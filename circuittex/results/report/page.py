@@ -15,6 +15,7 @@ from circuittex.base.arrays import Floats
 from circuittex.base.atomic import write_text
 from circuittex.design import Design
 from circuittex.results.claims.table import Table, claims_table
+from circuittex.results.clamps import clamp_statement
 from circuittex.results.heating import driven_otherwise, heating
 from circuittex.results.plot import save_figures
 from circuittex.results.records import Record, Study
@@ -146,7 +147,7 @@ def _states(study: Study) -> Markup:
         heat=_heat(study),
         ratings=_ratings(study),
         rise=_number(study.design.electrical.rated_rise),
-        effort=effort(study),
+        effort=(*effort(study), *clamp_statement(study)),
         energy=energy_section(study),
     )
 

@@ -35,6 +35,7 @@ def parameters(design: Design) -> Markup:
         ),
         *(_settings(f"Material {material.name}", material, skip=("name",)) for material in materials),
         *([] if design.packing.regular else [_settings("Random packing", design.packing)]),
+        *([] if design.clamps.held else [_settings("Clamps", design.clamps)]),
         _settings("Contact", design.contact, skip=("pairs",)),
         *(_settings(f"Contact {' - '.join(p.materials)}", p, skip=("materials",)) for p in design.contact.pairs),
         _settings("Electrical", design.electrical),

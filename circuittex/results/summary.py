@@ -8,6 +8,8 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
     version of circuittex, name of the design, and the hash that also stands in the netlists
 ``parameters``
     the design in full, as nested objects with its field names, in mm, N, MPa, g, S, W, K and V
+``start``
+    where the first relaxation started: "initial", the initial weave, or another start in words
 ``probes``
     names of the probes, in the order of every list of currents
 ``insulated_Ry_ohm``
@@ -95,7 +97,7 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results.bifurcation import BranchCheck, branch_statement, current_difference, force_difference
 from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.heating import driven_otherwise, heating
-from circuittex.results.records import Record, Study
+from circuittex.results.records import INITIAL, Record, Study
 from circuittex.results.soundness import deepest_overlap, doubt_statement, doubts, surface_stress
 from circuittex.results.verification import AGREEMENT
 from circuittex.results.work import EnergyBalance, step_balances
@@ -115,6 +117,7 @@ def summary(study: Study) -> dict[str, Any]:
             "design": study.design.name,
             "design_hash": study.design_hash,
             "parameters": study.design,
+            "start": study.start,
             "probes": [probe.name for probe in study.design.probes],
             "insulated_Ry_ohm": insulated_resistance(study.mesh),
             "states": [_state(study, record, steps.get(record.name)) for record in study.records],
@@ -212,6 +215,8 @@ def effort(study: Study) -> tuple[str, ...]:
         f"{states} in {sum(iterations)} iterations, at most {max(iterations)} for one; the largest free force "
         f"is {worst.residual:.1e} N in {worst.name} ({study.design.numerics.allowed} is allowed)."
     ]
+    if study.start != INITIAL:
+        sentences.append(f"The first relaxation did not start from the initial weave: {study.start}.")
     halved = [f"{record.name} in {record.parts} parts" for record in study.records if record.parts > 1]
     if halved:
         sentences.append(f"Increments too large to converge as a whole were halved: {', '.join(halved)}.")

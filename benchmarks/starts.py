@@ -22,7 +22,7 @@ from typing import Any
 
 from measure import Table, arguments, publish
 from scaling import peak_memory, warm_up
-from size import ROWS, cell
+from size import cell
 
 from circuittex.design import Design
 from circuittex.geometry.weave import build_mesh
@@ -133,7 +133,7 @@ def main() -> None:
     parser = arguments(__doc__)
     parser.add_argument("--weave", choices=WEAVES, default="plain", help="1/1 or a 2/2 twill")
     parser.add_argument("--yarns", type=int, nargs="+", help="yarns each way (default: 4 8, with --similar 2)")
-    parser.add_argument("--filaments", type=int, default=10, choices=sorted(ROWS), help="of a yarn")
+    parser.add_argument("--filaments", type=int, default=10, choices=(3, 10), help="of a yarn")
     parser.add_argument("--per-crossing", type=int, default=5, help="elements of a fibril from crossing to crossing")
     parser.add_argument("--only", choices=STARTS, help="one of the two")
     parser.add_argument("--similar", action="store_true", help="states of similar designs instead")

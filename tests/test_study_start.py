@@ -17,9 +17,10 @@ from circuittex.base.errors import DesignError, FolderError, StoreError
 from circuittex.base.frozen import same
 from circuittex.design import Design, Packing, parse_design
 from circuittex.mech.configuration import Configuration, initial_configuration
+from circuittex.results.effort import effort
 from circuittex.results.records import Study
 from circuittex.results.store import load_study, write_study_start
-from circuittex.results.summary import effort, summary
+from circuittex.results.summary import summary
 from circuittex.study import start as starts
 from circuittex.study.run import run_study
 

@@ -96,8 +96,9 @@ from circuittex.fit import Fit
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results.bifurcation import BranchCheck, branch_statement, current_difference, force_difference
 from circuittex.results.discretisation import ErrorEstimate
+from circuittex.results.effort import effort
 from circuittex.results.heating import driven_otherwise, heating
-from circuittex.results.records import INITIAL, Record, Study
+from circuittex.results.records import Record, Study
 from circuittex.results.soundness import deepest_overlap, doubt_statement, doubts, surface_stress
 from circuittex.results.verification import AGREEMENT
 from circuittex.results.work import EnergyBalance, step_balances
@@ -201,25 +202,6 @@ def network_statement(study: Study) -> tuple[str, ...]:
         for warning in record.fit.warnings:
             told.setdefault(warning, []).append(record.name)
     sentences += [f"{text[:1].upper()}{text[1:]} ({', '.join(names)})." for text, names in told.items()]
-    return tuple(sentences)
-
-
-def effort(study: Study) -> tuple[str, ...]:
-    """Sentences that say what the equilibria of the study took, and how good they are."""
-    if not study.records:
-        return ()
-    iterations = [record.iterations for record in study.records]
-    worst = max(study.records, key=lambda record: record.residual)
-    states = "1 equilibrium" if len(iterations) == 1 else f"{len(iterations)} equilibria"
-    sentences = [
-        f"{states} in {sum(iterations)} iterations, at most {max(iterations)} for one; the largest free force "
-        f"is {worst.residual:.1e} N in {worst.name} ({study.design.numerics.allowed} is allowed)."
-    ]
-    if study.start != INITIAL:
-        sentences.append(f"The first relaxation did not start from the initial weave: {study.start}.")
-    halved = [f"{record.name} in {record.parts} parts" for record in study.records if record.parts > 1]
-    if halved:
-        sentences.append(f"Increments too large to converge as a whole were halved: {', '.join(halved)}.")
     return tuple(sentences)
 
 

@@ -32,7 +32,7 @@ def full_study() -> Study:
     quantity = QuantityError("Ry", "ohm", 1.0, 1.1, 0.9, 1.0)
     estimate = ErrorEstimate(state, (2, 4, 8), (4, 8), np.zeros(3), (quantity,), ())
     check = BranchCheck(state, outcome, outcome, 0.0, (outcome, outcome), "")
-    return replace(study, errors=(estimate,), branches=(check,))
+    return replace(study, start="tiled, from 2 x 2 yarns", errors=(estimate,), branches=(check,))
 
 
 def contents(file: h5py.File) -> str:

@@ -35,6 +35,7 @@ SCRIPTS = [
     "paper_tables",
     "scaling",
     "size",
+    "starts",
     "table",
 ]
 ROUND_OFF = 1e-12
@@ -260,6 +261,18 @@ def test_size_measures_both_ways_and_compares_sizes() -> None:
     )
     assert len(table.rows[0]) == len(size.HEAD)
     assert table.rows[1][-2] == pytest.approx(1.0)
+
+
+def test_starts_measures_each(monkeypatch: pytest.MonkeyPatch) -> None:
+    starts = script("starts")
+    found = [starts.measured("plain", start, yarns, 3, 2) for start, yarns in (("initial", 2), ("tiled", 4))]
+    assert [result["start"] for result in found] == ["initial", "tiled, from 2 x 2"]
+    assert len(starts.table("plain", found).rows[0]) == len(starts.HEAD)
+    assert {len(row) for row in starts.woven("twill", 4, 3, 4).weave.draft} == {4}
+    monkeypatch.setattr(starts, "CHANGES", {"modulus": (1.1,), "radius": (1.1,), "penalty": (1.1,)})
+    table = starts.similar(1, 3, 8)
+    assert [row[:2] for row in table.rows[:2]] == [["1.1 x modulus", "initial"], ["1.1 x modulus", "state"]]
+    assert all(len(row) == len(table.head) for row in table.rows)
 
 
 def test_scaling_measures_a_size_and_compares_two() -> None:

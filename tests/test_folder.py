@@ -176,7 +176,7 @@ def test_what_is_there_stays_as_it_is(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_a_report_of_fewer_states_does_not_outlive_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Canned(STUDY).install(monkeypatch)
-    study = open_study(tmp_path, replace(STUDY, records=()))
+    study = open_study(tmp_path, replace(STUDY, records=()), lambda study: study)
     report(tmp_path, keep_record(tmp_path, study, STUDY.records[0]))  # as `circuittex report` does meanwhile
     run_study(STUDY.design, tmp_path, workers=1)
     assert (tmp_path / "report.html").read_text(encoding="utf-8") == " ".join(r.name for r in STUDY.records)

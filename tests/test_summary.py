@@ -15,8 +15,9 @@ from synthetic_study import INSULATED, synthetic_study
 
 import circuittex.results.summary as summary_module
 from circuittex.base.frozen import same
+from circuittex.results.effort import effort
 from circuittex.results.records import Study
-from circuittex.results.summary import effort, insulated_resistance, ngspice_statement, summary, table, write_summary
+from circuittex.results.summary import insulated_resistance, ngspice_statement, summary, table, write_summary
 
 STUDY = synthetic_study(3, contacts=40)
 

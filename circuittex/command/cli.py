@@ -95,6 +95,7 @@ def _run(options: argparse.Namespace) -> ExitCode:
             study = run_study(
                 design,
                 options.out,
+                start=options.start,
                 fresh=options.fresh,
                 error_estimate=options.error_estimate,
                 branches=options.branches,

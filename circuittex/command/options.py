@@ -113,6 +113,14 @@ def _add_run(commands: Commands) -> None:
         help="start again: remove what earlier runs left in DIR, of this design or another; your own files stay",
     )
     parser.add_argument(
+        "--start",
+        metavar="START",
+        default="initial",
+        help="where the first relaxation starts: 'initial', the initial weave (default); 'tiled', copies of the "
+        "smallest cell that the draft repeats, relaxed before; or FILE[:STATE], a stored state (default: relaxed) of a "
+        "design with as many fibrils in each yarn",
+    )
+    parser.add_argument(
         "--error-estimate",
         action="store_true",
         help="estimate the discretisation error of clamp forces, currents, Ry and Rc in the relaxed state and the last "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from circuittex.base.arrays import Floats
+from circuittex.base.arrays import Floats, Ints
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
 
@@ -29,9 +29,16 @@ def transfer(configuration: Configuration, source: FibrilMesh, target: FibrilMes
     elements, intervals = np.diff(source.first_element)[fibril], np.diff(target.first_node)[fibril] - 1
     place = node * elements / intervals  # in elements of the source: one rounding, none where meshes are nested
     element = np.minimum(place.astype(np.int64), elements - 1)
-    nodes = source.elements[source.first_element[fibril] + element]
-    weights = shape_functions(place - element, source.order)
-    return Configuration(np.einsum("na,naij->nij", weights, configuration.x[nodes]))
+    return Configuration(field_at(configuration.x, source, fibril, element, place - element))
+
+
+def field_at(x: Floats, mesh: FibrilMesh, fibril: Ints, element: Ints, t: Floats) -> Floats:
+    """(n, 3, 3) the finite element field of nodal values x (N, 3, 3) at places on fibrils, all (n,).
+
+    `element` counts those of the fibril, and t is the place in it, from 0 to 1.
+    """
+    nodes = mesh.elements[mesh.first_element[fibril] + element]
+    return np.asarray(np.einsum("na,naij->nij", shape_functions(t, mesh.order), x[nodes]))
 
 
 def shape_functions(t: Floats, order: int) -> Floats:

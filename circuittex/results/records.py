@@ -21,6 +21,9 @@ from circuittex.results.discretisation import ErrorEstimate
 from circuittex.results.outcome import Outcome, outcome
 from circuittex.results.verification import Verification
 
+INITIAL = "initial"
+"""The start of a study that begins with the initial weave, as all do that are not told otherwise."""
+
 
 @frozen
 class Record:
@@ -118,13 +121,15 @@ class Study:
     mesh: FibrilMesh
     """The fibrils."""
     initial: Configuration
-    """The configuration before the first relaxation."""
+    """The configuration before the first relaxation: the initial weave, or another start."""
     records: tuple[Record, ...]
     """The recorded states: the relaxed one, then loading by loading in the order of the design."""
     errors: tuple[ErrorEstimate, ...] = ()
     """Estimated discretisation errors, in the order of their states; not every state has one."""
     branches: tuple[BranchCheck, ...] = ()
     """Whether round-off chose the branch, in the order of the states; not every state has been checked."""
+    start: str = INITIAL
+    """Where the first relaxation started: 'initial', the initial weave, or another start in words."""
 
     def error_of(self, state: str) -> ErrorEstimate | None:
         """The error estimate of a state, if it has one."""

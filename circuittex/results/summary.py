@@ -8,6 +8,8 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
     version of circuittex, name of the design, and the hash that also stands in the netlists
 ``parameters``
     the design in full, as nested objects with its field names, in mm, N, MPa, g, S, W, K and V
+``start``
+    where the first relaxation started: "initial", the initial weave, or another start in words
 ``probes``
     names of the probes, in the order of every list of currents
 ``insulated_Ry_ohm``
@@ -97,6 +99,7 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results.bifurcation import BranchCheck, branch_statement, current_difference, force_difference
 from circuittex.results.clamps import clamp_statement, extensions, tensions
 from circuittex.results.discretisation import ErrorEstimate
+from circuittex.results.effort import effort
 from circuittex.results.heating import driven_otherwise, heating
 from circuittex.results.records import Record, Study
 from circuittex.results.soundness import deepest_overlap, doubt_statement, doubts, surface_stress
@@ -118,6 +121,7 @@ def summary(study: Study) -> dict[str, Any]:
             "design": study.design.name,
             "design_hash": study.design_hash,
             "parameters": study.design,
+            "start": study.start,
             "probes": [probe.name for probe in study.design.probes],
             "insulated_Ry_ohm": insulated_resistance(study.mesh),
             "states": [_state(study, record, steps.get(record.name)) for record in study.records],
@@ -202,23 +206,6 @@ def network_statement(study: Study) -> tuple[str, ...]:
         for warning in record.fit.warnings:
             told.setdefault(warning, []).append(record.name)
     sentences += [f"{text[:1].upper()}{text[1:]} ({', '.join(names)})." for text, names in told.items()]
-    return tuple(sentences)
-
-
-def effort(study: Study) -> tuple[str, ...]:
-    """Sentences that say what the equilibria of the study took, and how good they are."""
-    if not study.records:
-        return ()
-    iterations = [record.iterations for record in study.records]
-    worst = max(study.records, key=lambda record: record.residual)
-    states = "1 equilibrium" if len(iterations) == 1 else f"{len(iterations)} equilibria"
-    sentences = [
-        f"{states} in {sum(iterations)} iterations, at most {max(iterations)} for one; the largest free force "
-        f"is {worst.residual:.1e} N in {worst.name} ({study.design.numerics.allowed} is allowed)."
-    ]
-    halved = [f"{record.name} in {record.parts} parts" for record in study.records if record.parts > 1]
-    if halved:
-        sentences.append(f"Increments too large to converge as a whole were halved: {', '.join(halved)}.")
     return tuple(sentences)
 
 

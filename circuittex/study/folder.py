@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,15 +34,18 @@ MARKS = {
 REPORT, SUMMARY = "report.html", "summary.json"
 
 
-def open_study(folder: Path, study: Study, *, fresh: bool = False) -> Study:
-    """The study as far as it is in `folder` already, ready to go on; `study` itself, written there, in an empty one.
+def open_study(folder: Path, study: Study, begin: Callable[[Study], Study], *, fresh: bool = False) -> Study:
+    """The study as far as it is in `folder` already, ready to go on; in an empty one what `begin` makes of it, written
+    there.
 
     With `fresh` what an earlier run left is removed. Nothing is removed without it.
 
-    Raises `FolderError` where the results in the folder are of another design or version of circuittex, or damaged.
+    Raises `FolderError` where the results in the folder are of another design, start or version of circuittex, or
+    damaged.
     """
     path = folder / RESULTS
     if fresh:
+        study = begin(study)
         remove_results(folder)
         write_study_start(path, study)
     elif not path.exists():
@@ -50,6 +54,7 @@ def open_study(folder: Path, study: Study, *, fresh: bool = False) -> Study:
                 f"{folder}: it holds files of a run ({left[0].relative_to(folder)} and others) but no {RESULTS} to go "
                 f"on from; {ADVICE}"
             )
+        study = begin(study)
         write_study_start(path, study)
     else:
         complete_change(path)
@@ -75,6 +80,10 @@ def _continued(path: Path, study: Study) -> Study:
         raise FolderError(
             f"{path.parent}: its results are of circuittex {found.version}, and this is {study.version}, which may "
             f"compute other numbers (design hash {found.design_hash}); {ADVICE}"
+        )
+    if found.start != study.start:
+        raise FolderError(
+            f"{path.parent}: its first relaxation had another start, {found.start}, and this is {study.start}; {ADVICE}"
         )
     return found
 

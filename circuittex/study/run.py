@@ -21,7 +21,7 @@ from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.mech.multifrontal import MultifrontalSolver
-from circuittex.results.records import Examination, Study, with_examination
+from circuittex.results.records import INITIAL, Examination, Study, with_examination
 from circuittex.study.branch_check import branch_checks
 from circuittex.study.error_estimate import estimates, variants
 from circuittex.study.folder import (
@@ -38,6 +38,7 @@ from circuittex.study.plan import RELAXED, plan
 from circuittex.study.record import Recorded, reach
 from circuittex.study.rest import Rest
 from circuittex.study.schedule import compute
+from circuittex.study.start import chosen
 
 Say = Callable[[str], None]
 Keep = Callable[[Study, Recorded], Study]
@@ -47,6 +48,7 @@ def run_study(
     design: Design,
     out: str | Path | None = None,
     *,
+    start: str = INITIAL,
     fresh: bool = False,
     error_estimate: bool = False,
     branches: bool = False,
@@ -61,6 +63,10 @@ def run_study(
     call goes on from the states that are there, with the same numbers bit for bit; files that are missing are written
     again. Results of another design or version are refused unless `fresh` has them removed; files that are not of
     circuittex are left alone.
+
+    The first relaxation starts from the initial weave, or as `start` says: 'tiled', from copies of the smallest cell
+    that the draft repeats, relaxed before; FILE or FILE:STATE, from a stored state of a similar design, by default its
+    relaxed one. A folder goes on with the start that it was begun with.
 
     Loading paths are computed beside one another by `workers` processes, by default one for each path as far as there
     are cores; with one, or with a contact law of one's own, in this process. The results do not depend on it. `solver`
@@ -92,6 +98,11 @@ def run_study(
         initial=initial_configuration(mesh),
         records=(),
     )
+    started = chosen(study, start, solver, say)
+    study = replace(study, start=started.words)
+
+    def begin(study: Study) -> Study:
+        return replace(study, initial=started.configuration())
 
     def jobs(found: Study) -> Sequence[Job]:
         estimated = estimates(found, solver) if error_estimate else []
@@ -100,13 +111,13 @@ def run_study(
     if out is None:
         foreseen = foresee(study, count)
         _rest(study, count, say, foreseen)
-        study = _compute(study, foreseen.workers if foreseen else count, solver, say, _with)
+        study = _compute(begin(study), foreseen.workers if foreseen else count, solver, say, _with)
         return _examine(study, jobs(study), count, say, with_examination)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     with locked(folder):
         foreseen = foresee(study, count) if fresh else None  # what is too large removes nothing
-        study = open_study(folder, study, fresh=fresh)
+        study = open_study(folder, study, begin, fresh=fresh)
         return _in_folder(folder, study, count, solver, say, jobs, foreseen)
 
 

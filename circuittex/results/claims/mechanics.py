@@ -19,7 +19,7 @@ CORNER = 2.0
 
 
 def flattening(paper: PaperStudy) -> Finding:
-    before = levels(paper.study.mesh, paper.study.initial.r, *CENTRE)
+    before = levels(paper.study.mesh, paper.study.mesh.position, *CENTRE)
     after = paper.relaxed.levels
     return graded(f"{before} levels before, {after} after relaxation", (before, after) == (3, 2))
 

@@ -11,6 +11,7 @@ from matplotlib.patches import Patch
 
 from circuittex.base.arrays import Floats
 from circuittex.geometry.mesh import FibrilMesh
+from circuittex.mech.configuration import initial_configuration
 from circuittex.results.plot.cut import cut
 from circuittex.results.plot.style import COLOURS, new_figure, style
 from circuittex.results.records import Record, Study
@@ -27,7 +28,7 @@ def section_figure(study: Study, record: Record) -> Figure:
     with style():
         figure = new_figure(9.0, 4.2)
         grid = figure.subplots(2, 2, sharex="col", sharey="col", width_ratios=(1.0, 2.4), squeeze=False)
-        states = (("before", study.initial.x), (record.name, record.configuration.x))
+        states = (("before", initial_configuration(mesh).x), (record.name, record.configuration.x))
         for row, (name, x) in zip(grid, states, strict=True):
             for axes, axis, other in ((row[0], 0, weft), (row[1], 1, warp)):
                 place = float(x[mesh.yarn[mesh.node_fibril] == other, 0, axis].mean())

@@ -16,6 +16,7 @@ from circuittex.base.atomic import write_text
 from circuittex.design import Design
 from circuittex.results.claims.table import Table, claims_table
 from circuittex.results.clamps import clamp_statement
+from circuittex.results.effort import effort
 from circuittex.results.heating import driven_otherwise, heating
 from circuittex.results.plot import save_figures
 from circuittex.results.records import Record, Study
@@ -32,7 +33,6 @@ from circuittex.results.summary import (
     agrees,
     confirmed,
     difference,
-    effort,
     insulated_resistances,
     network_names,
     network_statement,

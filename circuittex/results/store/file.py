@@ -16,7 +16,7 @@ from circuittex.base.version import __version__
 from circuittex.design import Design
 from circuittex.results.bifurcation import BranchCheck
 from circuittex.results.discretisation import ErrorEstimate
-from circuittex.results.records import EXAMINATIONS, Examination, Record, Study, with_examination
+from circuittex.results.records import EXAMINATIONS, INITIAL, Examination, Record, Study, with_examination
 from circuittex.results.store.archive import ATTRIBUTES, MEANING, Digests, Former, Reader, Writer, reader_of, registry
 from circuittex.results.store.journal import Overlay, commit, finish, overlay, snapshot
 from circuittex.results.store.meaning import meanings, summary
@@ -31,6 +31,8 @@ RESULTS = "results.h5"
 """What the file is called in a study's folder."""
 HEAD = ("version", "design", "design_hash", "mesh", "initial")
 """The fields of a `Study` that are known before its first record."""
+CHOSEN = "start"
+"""One more, which is written where it is not the default: files that older versions know stay as they are."""
 NAMES: dict[type[Examination], str] = {ErrorEstimate: "error estimate", BranchCheck: "branch check"}
 """What examinations are called where one is damaged."""
 LIBVER = ("v110", "v110")
@@ -53,13 +55,14 @@ def write_study_start(path: str | Path, study: Study) -> None:
         writer = Writer(file)
         file.attrs.update({"format": FORMAT, "format_version": VERSION, MEANING: summary(Study)})
         told = meanings(Study)
-        for name in HEAD:
+        head = HEAD if study.start == INITIAL else (*HEAD, CHOSEN)
+        for name in head:
             part = getattr(study, name)
             writer.put(file, name, part, summary(type(part)) if is_dataclass(part) else told.get(name, ""))
         file.attrs[ATTRIBUTES] = "\n".join(
-            f"{name}: {told[name]}" for name in ("version", "design_hash") if name in told
+            f"{name}: {told[name]}" for name in ("version", "design_hash", CHOSEN) if name in told and name in head
         )
-        file.attrs["@digest"] = writer.digest(tuple(getattr(study, name) for name in HEAD))
+        file.attrs["@digest"] = writer.digest(tuple(getattr(study, name) for name in head))
         for name, meaning in GROUPS.items():
             file.require_group(name).attrs[MEANING] = meaning
         for record in study.records:
@@ -130,13 +133,14 @@ def _read(content: Overlay) -> Study:
         former: Former = FORMER if version == 1 else {}
         reader = Reader(registry(Study), former, _author(file))
         start = file if version > 1 else file["study"]
-        head = tuple(reader.get(start, name) for name in HEAD)
+        names = (*HEAD, CHOSEN) if CHOSEN in start.attrs else HEAD
+        head = tuple(reader.get(start, name) for name in names)
         records = _members(file["states" if version > 1 else "records"], reader)
         examinations = {kind: _members(file[group], reader) for kind, group in EXAMINATIONS.items() if group in file}
         digest = Digests(reader.lacking, former)
         if start.attrs["@digest"] != digest(head):
             raise StoreError("its content does not match its digest")
-        study = Study(**dict(zip(HEAD, head, strict=True)), records=())
+        study = Study(**dict(zip(names, head, strict=True)), records=())
         study = replace(study, records=_by_plan(study.design, _checked(records, "record", digest)))
         for kind, members in examinations.items():
             for examination in _checked(members, NAMES[kind], digest):

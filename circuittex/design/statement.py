@@ -93,7 +93,7 @@ class Electrical:
         default=LINEAR,
         kw_only=True,
         metadata=choice(
-            '"linear": resistances as stated, those of 27 C, and radiation linear in the rise; "nonlinear": resistances '
+            '"linear": resistances as stated, those of 27 C, and radiation linear in the rise; "nonlinear": they '
             "follow tc1 and tc2 to the temperatures of each probe, and radiation goes with T^4",
             (LINEAR, NONLINEAR),
             shown=LINEAR,
@@ -407,11 +407,13 @@ class Design:
                     raise refuse("contact.pairs.materials", material, allowed)
 
     def _check_heating(self) -> None:
-        followed = [each for yarn in self.weave.yarns for each in yarn.fibrils]
-        followed = any(each.tc1 or each.tc2 for each in (*followed, self.contact, *self.contact.pairs))
-        if self.electrical.heating == NONLINEAR and not (self.electrical.emissivity or followed):
+        electrical, fibrils = self.electrical, [each for yarn in self.weave.yarns for each in yarn.fibrils]
+        follows = any(each.tc1 or each.tc2 for each in fibrils) or any(
+            each.tc1 or each.tc2 for each in (self.contact, *self.contact.pairs)
+        )
+        if electrical.heating == NONLINEAR and not (electrical.emissivity or follows):
             allowed = "nothing of the design is nonlinear: state tc1 or tc2 of what conducts, or electrical.emissivity"
-            raise refuse("electrical.heating", self.electrical.heating, allowed)
+            raise refuse("electrical.heating", electrical.heating, allowed)
 
 
 def design_hash(design: Design) -> str:

@@ -92,9 +92,11 @@ def rating(field: Fields, rise: float) -> float:
     """How many times its voltage and current a probe may have for a largest temperature rise of `rise`, K.
 
     The equations of a probe are linear and its heat is quadratic in the voltage: the rise goes with the square of
-    voltage and current, hence sqrt(rise / peak). nan where nothing is warmed.
+    voltage and current, hence sqrt(rise / peak). nan where nothing is warmed, and where resistances follow the
+    temperatures.
     """
-    return float(np.sqrt(rise / field.peak_temperature)) if field.peak_temperature > 0.0 else float("nan")
+    linear = field.peak_temperature > 0.0 and not len(field.resistivity)
+    return float(np.sqrt(rise / field.peak_temperature)) if linear else float("nan")
 
 
 def rated_currents(study: Study, rise: float) -> Floats:

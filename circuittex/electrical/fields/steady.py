@@ -149,9 +149,7 @@ class _Problem:
     @cached_property
     def resistors(self) -> Resistors:
         elements = len(self.contacts.mesh.elements)
-        return resistors_of(
-            self.line, self.electric, self.thermal, self.coefficients, self.contact_heat, elements
-        )
+        return resistors_of(self.line, self.electric, self.thermal, self.coefficients, self.contact_heat, elements)
 
     @cached_property
     def inside(self) -> Ints:

@@ -15,8 +15,7 @@ from circuittex.base.errors import CircuittexWarning, DesignError
 from circuittex.base.version import __version__
 from circuittex.electrical.network.names import safe_name
 from circuittex.results.records import Study
-from circuittex.study.circuits import state_circuits
-from circuittex.study.export import probe_netlist, simplified
+from circuittex.study.export import circuits_of, probe_netlist
 from circuittex.study.library.accuracy import Errors
 from circuittex.study.library.cell import DIALECTS, Cell
 from circuittex.study.library.datasheet import write_datasheet
@@ -199,7 +198,7 @@ def _write_probes(folder: Path, study: Study, chosen: int) -> None:
     record, design = study.records[chosen], study.design
     if not design.probes:
         return
-    circuits = state_circuits(simplified(design, record.contacts), design.terminals, design.probes)
+    circuits = circuits_of(design, record.contacts, record.fields)
     for probe in record.driven(design).probes:
         word = safe_name(probe.name)
         _write_ascii(folder / f"probe_{word}_free.cir", probe_netlist(design, record.name, circuits, probe))

@@ -29,7 +29,8 @@ class Heating:
     voltage: float
     """Of the source above the sink, V."""
     rated_current: float
-    """The current at which the largest rise is the rated one, A; nan where nothing is warmed, and so the next two."""
+    """The current at which the largest rise is the rated one, A; nan where nothing is warmed or the heating is
+    nonlinear, and so the next two."""
     rated_power: float
     """The power that the source feeds in then, V I, W."""
     rated_power_density: float

@@ -21,7 +21,7 @@ from circuittex.netlist import Header, deck, subcircuit
 from circuittex.study.circuits import StateCircuits, state_circuits
 
 JOINED = "every yarn end is one pin that joins its fibrils; the probe decks join those of their two terminals only"
-COLD = "resistances are those at 27 C; the probe decks have them at the temperatures of their probes"
+COLD = "resistances are those at 27 C; those at the temperatures that a probe makes are in its own deck"
 WARM = "resistances are those at the temperatures that the probe makes; at another voltage they are others"
 
 

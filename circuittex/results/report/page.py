@@ -14,6 +14,7 @@ from markupsafe import Markup
 from circuittex.base.arrays import Floats
 from circuittex.base.atomic import write_text
 from circuittex.design import Design
+from circuittex.design.statement import LINEAR
 from circuittex.results.claims.table import Table, claims_table
 from circuittex.results.clamps import clamp_statement
 from circuittex.results.heating import driven_otherwise, heating
@@ -171,7 +172,8 @@ def _ratings(study: Study) -> dict[str, Any]:
     for record in study.records:
         rated = [(h.rated_current, h.rated_power, h.rated_power_density) for h in heating(study, record)]
         rows.append([record.name, *(_number(value) for each in rated for value in each)])
-    return {"head": head, "rows": rows if _is_heater(study.design) else []}
+    told = study.design.electrical.heating == LINEAR
+    return {"head": head, "rows": rows if told and _is_heater(study.design) else []}
 
 
 def _is_heater(design: Design) -> bool:

@@ -293,6 +293,36 @@ def test_a_current_through_a_metal_runs_away() -> None:
         uniform(along(current=1.1 * most), tc1)
 
 
+@pytest.mark.parametrize("times", [1.5, 2.5])
+def test_a_metal_between_cold_ends_runs_away(times: float) -> None:
+    """T = (cos(m (x - L/2)) / cos(m L/2) - 1) / tc1, m^2 = i^2 rho tc1 / kA, has no bound at m L = pi. Beyond, what
+    solves the equations is below zero somewhere, with resistances that are not positive."""
+    state, tc1 = straight(8), 0.004
+    most = np.pi / LENGTH * np.sqrt(KA / (OHM * tc1))
+    with pytest.raises(DesignError, match=r"thermal runaway") as refused:
+        solve_steady(state, ENDS, along(current=times * most), following(state, tc1), cooling=COLD_ENDS)
+    # Elements of an eighth, of which each has one heat: (pi / 8)^2 / 24 = 0.6 % off; and the shortest steps.
+    assert float(refused.value.allowed.split()[-2]) == pytest.approx(most, rel=0.01)
+
+
+@pytest.mark.parametrize(("load", "held"), [(34.0, True), (36.0, False), (45.0, False)])
+def test_a_colder_state_is_not_jumped_over(load: float, held: bool) -> None:
+    """V^2 / R0 = h S T f(T), f = 1 - 0.009 T + 2.5e-5 T^2: T f goes up to 35.3 at 87 K, down to 31.9 and up again. So
+    34 has three states, the coldest of which is reached, and 36 and 45 have one that is not, at 188 and 211 K."""
+    tc1, tc2 = -0.009, 2.5e-5
+    state = straight()
+    probe = along(voltage=np.sqrt(load * H * SURFACE * WHOLE))
+    roots = np.roots([tc2, tc1, 1.0, -load])
+    given = following(state, tc1, tc2)
+    if held:
+        found = solve_steady(state, ENDS, probe, given, cooling=surfaces(state))
+        assert found.peak_temperature == pytest.approx(float(roots.real.min()), rel=ROUNDING)
+        return
+    assert np.sum(np.abs(roots.imag) < 1e-9) == 1
+    with pytest.raises(DesignError, match=r"thermal runaway"):
+        solve_steady(state, ENDS, probe, given, cooling=surfaces(state))
+
+
 def test_a_power_by_area_needs_the_area() -> None:
     state = straight()
     with pytest.raises(DesignError, match=r"area: 0\.0 is not usable.*power"):

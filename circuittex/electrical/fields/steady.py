@@ -8,6 +8,7 @@ from functools import cached_property
 from math import copysign, sqrt
 
 import numpy as np
+from scipy.sparse.linalg import splu
 from skfem import Basis, ElementLineP1, ElementLineP2, MeshLine
 
 from circuittex.base.arrays import Floats, Ints
@@ -23,7 +24,6 @@ from circuittex.electrical.fields.system import System, build_system, outflow
 from circuittex.electrical.fields.tangent import (
     Resistors,
     Tangent,
-    factorised,
     linearised,
     radiated,
     resistor_values,
@@ -62,10 +62,10 @@ def solve_steady(
 
     f of an element of the mechanics is its mean, that of a contact at the mean of its two temperatures; g and r are
     the `loss` and `radiating` of `cooling`, Ts = 300 K. By Newton's method for V, T and f at once, from the cold state,
-    to a last correction of `TOLERANCE`. Where a correction is more than half of the one before, a resistance is not
-    positive or the tangent has a negative determinant, the drive, which is the square of a voltage or current, or a
-    power, is raised in smaller steps. So the state is the one that is reached when the drive is raised from nothing,
-    and where there is none, at a fold or where the rise has no bound, its steps become shorter than `LEAST`.
+    to a last correction of `TOLERANCE`. Where a correction is more than half of the one before, or a resistance is not
+    positive, the drive, which is the square of a voltage or current, or a power, is raised in smaller steps. So the
+    state is the one that is reached when the drive is raised from nothing, and where there is none, at a fold or where
+    the rise has no bound, its steps become shorter than `LEAST`.
 
     The probe is driven as it states; for a power by area that is of `area`, mm2. The result tells its voltage, and the
     factors f, with which `at_temperatures` gives the circuit. A straight fibril of the paper's that is cooled at its
@@ -84,7 +84,7 @@ def solve_steady(
     (True, True)
 
     Raises DesignError where a terminal is unknown, no current flows by which a probe could be driven as it states, or
-    there is no steady state: thermal runaway. It says how far the drive can be raised.
+    there is thermal runaway before the drive is reached. It says how far it can be raised.
     """
     if probe.stated == "power_density" and not area > 0.0:
         raise DesignError("area", area, "a power by area needs it, in mm2")
@@ -108,13 +108,13 @@ def solve_steady(
 
 
 def _runaway(probe: Probe, reached: float) -> DesignError:
-    """No steady state at the drive of a probe, but at this part of it."""
+    """No steady state is reached at the drive of a probe, but at this part of it."""
     value = float(getattr(probe, probe.stated))
     most = abs(value) * (reached if probe.stated == "power_density" else sqrt(reached))
     unit = {"voltage": "V", "current": "A", "power_density": "W/mm2"}[probe.stated]
     allowed = (
-        "there is no steady state, but thermal runaway: heat grows faster with the temperature than what leaves; "
-        f"it holds up to {most:.4g} {unit}"
+        "thermal runaway: heat grows faster with the temperature than what leaves; there is a steady state, reached "
+        f"from the cold, up to {most:.4g} {unit}"
     )
     return DesignError(f"probes.{probe.name}.{probe.stated}", value, allowed)
 
@@ -215,8 +215,6 @@ def _newton(problem: _Problem, drive: float, start: Floats) -> Floats | None:
             return None
         T = T + correction
         size = float(np.abs(correction).max())
-        if not np.isfinite(size):
-            return None
         if size <= TOLERANCE * float(np.abs(T).max()):
             return T
         if size > CONTRACTION * before:
@@ -226,7 +224,7 @@ def _newton(problem: _Problem, drive: float, start: Floats) -> Floats | None:
 
 
 def _correction(problem: _Problem, drive: float, T: Floats, factors: Floats, change: object) -> Floats | None:
-    """(N,) Newton's correction of T; None where no stable state is near."""
+    """(N,) Newton's correction of T; None where there is none."""
     line, electric, flow = problem.flow(factors)
     conductance, current, heat = resistor_values(line, electric, flow)
     power = problem.square(drive, float(flow.terminal_currents[0]))
@@ -245,10 +243,8 @@ def _correction(problem: _Problem, drive: float, T: Floats, factors: Floats, cha
     )
     exponent = EXPONENTS[problem.probe.stated] if heat.any() else 0
     try:
-        matrix, sign = factorised(linearised(resistors, at, power, exponent))
+        matrix = splu(linearised(resistors, at, power, exponent))
     except RuntimeError:  # singular: at a fold
-        return None
-    if not sign > 0.0:
         return None
     right = np.zeros(matrix.shape[0])
     right[len(at.free) : len(at.free) + len(inside)] = -residual[inside]

@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import block_array, coo_array, csr_array, diags_array, vstack
-from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import SuperLU, splu
 from skfem import BilinearForm, ElementLineP0, LinearForm
 
 from circuittex.base.arrays import Floats, Ints
@@ -172,21 +170,6 @@ def linearised(resistors: Resistors, at: Tangent, power: float, exponent: int) -
         dG = np.asarray(heats.sum(axis=0)).ravel() * (-exponent / total)
         rows.append([None, None, csr_array(dG[None, :]), csr_array(np.ones((1, 1)))])
     return block_array(rows, format="csc")
-
-
-def factorised(matrix: Any) -> tuple[SuperLU, float]:
-    """The factors of a matrix and the sign of its determinant; RuntimeError where it is singular."""
-    factors = splu(matrix)
-    signs = np.sign(factors.U.diagonal())
-    return factors, float(np.prod(signs)) * _parity(factors.perm_r) * _parity(factors.perm_c)
-
-
-def _parity(permutation: Ints) -> float:
-    """1 for an even permutation, -1 for an odd one."""
-    n = len(permutation)
-    graph = coo_array((np.ones(n), (np.arange(n), permutation)), shape=(n, n))
-    cycles, _ = connected_components(graph, directed=False)
-    return -1.0 if (n - cycles) % 2 else 1.0
 
 
 def resistor_values(line: FibrilLine, electric: System, flow: Flow) -> tuple[Floats, Floats, Floats]:

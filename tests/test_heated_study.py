@@ -24,7 +24,7 @@ from circuittex.electrical.fields import (
     solve_steady,
 )
 from circuittex.electrical.spice.ngspice import run_deck
-from circuittex.results.heating import fabric_area, heating
+from circuittex.results.heating import fabric_area, heating, rated_currents
 from circuittex.results.records import Study
 from circuittex.results.report.page import page
 from circuittex.results.soundness import doubts
@@ -166,12 +166,21 @@ def test_other_branches_are_told_apart_by_the_same_currents(heated: Study) -> No
     assert not check.bifurcation
 
 
-def test_ratings_are_not_told(heated: Study, linear: Study) -> None:
-    assert all(np.isnan(each.rated_current) for each in heating(heated, heated.records[0]))
-    assert all(each.rated_current > 0.0 for each in heating(linear, linear.records[0]))
-    assert summary(heated)["states"][0]["heating"][1]["rated_power_W"] is None
-    assert "rated_rise" not in page(heated, {})
-    assert "rated_rise" in page(linear, {})
+def test_ratings_are_those_of_the_temperatures(heated: Study, linear: Study) -> None:
+    """For the design's rise, 10 K, at which radiation and resistances change by some per cent; summary and report."""
+    warm, cold = (heating(study, study.records[0]) for study in (heated, linear))
+    area = fabric_area(heated.design, heated.records[0].gradient)
+    for one, other, field in zip(warm, cold, heated.records[0].fields, strict=True):
+        assert one.rated_current == field.rated[1]
+        assert one.rated_power_density == pytest.approx(100 * field.rated[2] / area, rel=ROUTES)
+        assert 0.001 < abs(one.rated_current / other.rated_current - 1) < 0.1
+    assert [each.rated_current for each in warm[:3]] == pytest.approx([warm[0].rated_current] * 3, rel=1e-8)  # one path
+    told = summary(heated)["states"][0]["heating"][1]
+    assert told["rated_power_W"] == warm[1].rated_power
+    assert rated_currents(heated, 10.0).tolist() == [[each.rated_current for each in warm]]
+    assert np.isnan(rated_currents(heated, 20.0)).all()
+    assert "at the temperatures of that rise" in page(heated, {})
+    assert "conductivities do not change" in page(linear, {})
 
 
 def test_commands_go_on_with_a_stored_study(
@@ -185,6 +194,8 @@ def test_commands_go_on_with_a_stored_study(
     with pytest.warns(CircuittexWarning, match="one state"):
         export_library(heated, tmp_path / "library")
     write_kit(heated, tmp_path / "kit")
+    with pytest.raises(DesignError, match=r"rise: 20\.0 is not usable.*electrical\.rated_rise.*10"):
+        export_library(heated, tmp_path / "other", rise=20.0)
     alike = tmp_path / "library" / "examples"
     assert (alike / "probe_volts_free.cir").read_text(encoding="ascii") == deck
     assert "those at 27 C" in (alike / "probe_volts_crimped.cir").read_text(encoding="ascii")

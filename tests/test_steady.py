@@ -228,10 +228,10 @@ def test_newton_converges_at_second_order(cell: ContactState, monkeypatch: pytes
     sizes: list[float] = []
     inner = steady._correction
 
-    def spied(*given: Any) -> Floats | None:
+    def spied(*given: Any) -> tuple[Floats, float] | None:
         found = inner(*given)
         assert found is not None
-        sizes.append(float(np.abs(found).max()))
+        sizes.append(float(np.abs(found[0]).max()))
         return found
 
     monkeypatch.setattr(steady, "_correction", spied)
@@ -321,6 +321,34 @@ def test_a_colder_state_is_not_jumped_over(load: float, held: bool) -> None:
     assert np.sum(np.abs(roots.imag) < 1e-9) == 1
     with pytest.raises(DesignError, match=r"thermal runaway"):
         solve_steady(state, ENDS, probe, given, cooling=surfaces(state))
+
+
+@pytest.mark.parametrize("tc1", [0.004, FALLING])
+def test_the_rated_current_of_a_fibril_of_one_temperature(tc1: float) -> None:
+    """I^2 R0 f(T) = leaves(T) at the rise that is asked for, whatever the drive: past the fold of a voltage as well."""
+    state, T = straight(), 0.9 / -FALLING
+    cooling = surfaces(state, H, RADIATES)
+    for probe in (along(voltage=1e-3), along(current=0.02)):
+        found = solve_steady(state, ENDS, probe, following(state, tc1), cooling=cooling, rise=T)
+        assert found.rated.tolist() == pytest.approx(
+            [T, np.sqrt(leaves(T) / (WHOLE * (1 + tc1 * T))), leaves(T)], rel=ROUNDING
+        )
+    idle = (ENDS[0], Terminal("far", (("warp2", 1),)))
+    nothing = Probe("apart", "one", "far", 1.0)
+    assert np.isnan(solve_steady(state, idle, nothing, following(state, tc1), cooling=cooling, rise=T).rated[1:]).all()
+
+
+def test_the_rated_current_makes_the_rated_rise(cell: ContactState) -> None:
+    """The hottest point, wherever it comes to lie, and inside an element or not."""
+    given = following(cell, 0.004, 1e-6, -0.001)
+    for end in (None, 3e-3):
+        cooling = surfaces(cell, 1e-4, RADIATES, end)
+        faint = solve_steady(cell, TOUCHING, Probe("across", "left", "top", 0.1), given, cooling=cooling, rise=30.0)
+        rise, current, power = faint.rated.tolist()
+        found = solve_steady(cell, TOUCHING, Probe("across", "left", "top", current=current), given, cooling=cooling)
+        assert rise == 30.0
+        assert found.peak_temperature == pytest.approx(30.0, rel=1e-8)  # sought to 1e-9
+        assert found.voltage * current == pytest.approx(power, rel=1e-8)
 
 
 def test_a_power_by_area_needs_the_area() -> None:

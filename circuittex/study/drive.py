@@ -78,6 +78,7 @@ def steady_fields(
                 cooling=cooling,
                 area=area,
                 contact_heat=stated.electrical.contact_heat,
+                rise=stated.electrical.rated_rise,
             )
         )
     return tuple(found)

@@ -68,6 +68,9 @@ class Fields(Potential):
     """(M,) mean resistivity of each element of the fibrils over that at 27 C; empty where it follows no temperature."""
     contact_resistivity: Floats = field(default_factory=lambda: np.empty(0))
     """(C,) resistance of each contact over that at 27 C; empty where it follows no temperature."""
+    rated: Floats = field(default_factory=lambda: np.empty(0))
+    """(3,) a rise of the hottest point, and the current and the power of the source with which it has that [K, A, W];
+    empty where the fields are linear, from which these follow."""
 
 
 def solve_fields(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import copysign, sqrt
@@ -20,7 +20,7 @@ from circuittex.electrical.fields.cooling import Cooling
 from circuittex.electrical.fields.flow import Flow, electric_conductance, flow_of, joule_heat
 from circuittex.electrical.fields.line import FibrilLine
 from circuittex.electrical.fields.solution import Fields, Mesh, fields_of, line_of, losses
-from circuittex.electrical.fields.system import System, build_system, outflow
+from circuittex.electrical.fields.system import System, build_system, outflow, peak
 from circuittex.electrical.fields.tangent import (
     Resistors,
     Tangent,
@@ -38,10 +38,15 @@ CONTRACTION = 0.5
 jumped over, and that on the way from the cold state is found."""
 MOST = 30
 """Corrections at a drive: with that contraction enough for any tolerance."""
+PEAK = 1e-9
+"""Relative difference of the largest rise from the one for which current and power are rated."""
 LEAST = 1e-3
 """Step of the drive, in parts of what has been reached, that is not halved further."""
 EXPONENTS = {"voltage": 0, "power_density": 1, "current": 2}
 """n in p G^n = const for what is stated of a probe: p = V^2 itself, the power p G, or the square of the current."""
+
+_State = tuple[Floats, float]
+"""(N,) temperatures and the square of the voltage between the terminals."""
 
 
 def solve_steady(
@@ -54,6 +59,7 @@ def solve_steady(
     area: float = 0.0,
     contact_heat: bool = True,
     mesh: Mesh = "feet",
+    rise: float = 0.0,
 ) -> Fields:
     """Solve [38] and [37] together for one probe, at the temperatures that follow from it.
 
@@ -67,9 +73,11 @@ def solve_steady(
     state is the one that is reached when the drive is raised from nothing, and where there is none, at a fold or where
     the rise has no bound, its steps become shorter than `LEAST`.
 
-    The probe is driven as it states; for a power by area that is of `area`, mm2. The result tells its voltage, and the
-    factors f, with which `at_temperatures` gives the circuit. A straight fibril of the paper's that is cooled at its
-    ends, whose resistivity rises by 0.4 % for each kelvin and that is given 10 mV:
+    The probe is driven as it states; for a power by area that is of `area`, mm2. With `rise`, K, the current and the
+    power are rated at which the hottest point rises by that, whatever drives it: the same equations, with the rise
+    given and the voltage sought. The result tells its voltage, and the factors f, with which `at_temperatures` gives
+    the circuit. A straight fibril of the paper's that is cooled at its ends, whose resistivity rises by 0.4 % for each
+    kelvin and that is given 10 V:
 
     >>> from circuittex.design import plain_weave
     >>> from circuittex.electrical.fields.cooling import COLD_ENDS
@@ -92,19 +100,55 @@ def solve_steady(
     problem = _Problem(contacts, terminals, probe, coefficients, cooling, contact_heat, line, axes)
     wanted = {"voltage": probe.voltage**2, "current": (probe.current or 0.0) ** 2}
     drive = wanted.get(probe.stated, (probe.power_density or 0.0) * area)
-    reached, T = 0.0, np.zeros(problem.thermal.basis.N)
-    step = 1.0
+    cold = np.zeros(problem.thermal.basis.N), 0.0
+    reached, (T, power) = _raised(lambda part, state: _newton(problem, state, drive=part * drive), cold)
+    if reached < 1.0:
+        raise _runaway(probe, reached)
+    return replace(problem.fields(T, power), rated=_rated(problem, T, power, rise) if rise else np.empty(0))
+
+
+def _raised(step: Callable[[float, _State], _State | None], state: _State) -> tuple[float, _State]:
+    """Go to the whole of what is wanted, in parts where it must be: the part that was reached, and its state."""
+    reached, size = 0.0, 1.0
     while reached < 1.0:
-        part = min(1.0, reached + step)
-        found = _newton(problem, part * drive, T)
+        part = min(1.0, reached + size)
+        found = step(part, state)
         if found is not None:
-            reached, T = part, found
-            step *= 2.0
+            reached, state, size = part, found, 2.0 * size
             continue
-        step = 0.25 * (part - reached)
-        if step < LEAST * max(reached, LEAST):
-            raise _runaway(probe, reached)
-    return problem.fields(T, drive)
+        size = 0.25 * (part - reached)
+        if size < LEAST * max(reached, LEAST):
+            break
+    return reached, state
+
+
+def _rated(problem: _Problem, T: Floats, power: float, rise: float) -> Floats:
+    """(3,) that rise of the hottest point, and current and power that the source feeds in then, K, A, W; nan where
+    nothing is warmed. From a solution T (N,) at the square of a voltage, `power`.
+
+    The hottest dof has what makes the hottest point, which lies beside it, rise by that.
+    """
+    basis, nothing = problem.thermal.basis, np.array([rise, np.nan, np.nan])
+    if not peak(basis, T) > 0.0:
+        return nothing
+    hot, wanted = int(np.argmax(T)), rise * float(T.max()) / peak(basis, T)
+    cold = np.zeros(len(T)), power * rise / peak(basis, T)
+    reached, state = _raised(lambda part, state: _newton(problem, state, hot=hot, rise=part * wanted), cold)
+    for _ in range(MOST):
+        T, power = state
+        if reached < 1.0:
+            return nothing
+        if abs(peak(basis, T) / rise - 1.0) < PEAK:
+            break
+        hot = int(np.argmax(T))
+        wanted = rise * float(T[hot]) / peak(basis, T)
+        again = _newton(problem, state, hot=hot, rise=wanted)
+        reached, state = (0.0, state) if again is None else (1.0, again)
+    else:
+        return nothing
+    _, _, unit = problem.flow(problem.resistors.factors(T)[0])
+    conductance = float(unit.terminal_currents[0])
+    return np.array([rise, sqrt(power) * conductance, power * conductance])
 
 
 def _runaway(probe: Probe, reached: float) -> DesignError:
@@ -181,11 +225,10 @@ class _Problem:
             raise DesignError(f"probes.{self.probe.name}.{self.probe.stated}", self.probe.drive, allowed)
         return drive / conductance ** EXPONENTS[self.probe.stated]
 
-    def fields(self, T: Floats, drive: float) -> Fields:
-        """What is kept of the solution T (N,)."""
+    def fields(self, T: Floats, power: float) -> Fields:
+        """What is kept of the solution T (N,) at the square of a voltage."""
         factors, _ = self.resistors.factors(T)
-        _, _, unit = self.flow(factors)
-        voltage = sqrt(self.square(drive, float(unit.terminal_currents[0])))
+        voltage = sqrt(power)
         probe = self.probe.at(copysign(voltage, self.probe.current or self.probe.voltage or 1.0))
         line, _, flow = self.flow(factors, probe.voltage)
         load = joule_heat(self.thermal, flow, self.contact_heat)
@@ -203,51 +246,55 @@ class _Problem:
         )
 
 
-def _newton(problem: _Problem, drive: float, start: Floats) -> Floats | None:
-    """The temperatures (N,) at a drive, from those at a smaller one; None where the iteration may not be trusted."""
-    T, before = start, np.inf
+def _newton(
+    problem: _Problem, start: _State, *, drive: float = 0.0, hot: int | None = None, rise: float = 0.0
+) -> _State | None:
+    """The state at a drive, or that in which the dof `hot` rises by `rise`, from one at less; None where the iteration
+    may not be trusted."""
+    (T, power), before = start, np.inf
     for _ in range(MOST):
         factors, change = problem.resistors.factors(T)
         if not factors.min(initial=1.0) > 0.0:
             return None
-        correction = _correction(problem, drive, T, factors, change)
-        if correction is None:
+        line, electric, flow = problem.flow(factors)
+        if hot is None:
+            power = problem.square(drive, float(flow.terminal_currents[0]))
+        values = resistor_values(line, electric, flow)
+        found = _correction(
+            problem, (T, power), Tangent(flow.free, problem.inside, *values, factors, change), hot, rise
+        )
+        if found is None:
             return None
-        T = T + correction
+        correction, more = found
+        T, power = T + correction, power * (1.0 + more)
         size = float(np.abs(correction).max())
         if size <= TOLERANCE * float(np.abs(T).max()):
-            return T
+            return (T, power) if power >= 0.0 else None
         if size > CONTRACTION * before:
             return None
         before = size
     return None
 
 
-def _correction(problem: _Problem, drive: float, T: Floats, factors: Floats, change: object) -> Floats | None:
-    """(N,) Newton's correction of T; None where there is none."""
-    line, electric, flow = problem.flow(factors)
-    conductance, current, heat = resistor_values(line, electric, flow)
-    power = problem.square(drive, float(flow.terminal_currents[0]))
-    resistors, inside = problem.resistors, problem.inside
+def _correction(
+    problem: _Problem, state: _State, at: Tangent, hot: int | None, rise: float
+) -> tuple[Floats, float] | None:
+    """(N,) Newton's correction of T, and the relative one of the square of the voltage; None where there is none."""
+    T, power = state
+    resistors, inside = problem.resistors, at.inside
     away, more = radiated(problem.thermal.basis, problem.radiating, T)
-    residual = outflow(problem.thermal, T) + away - power * (resistors.warms @ heat)
-    at = Tangent(
-        free=flow.free,
-        inside=inside,
-        conductance=conductance,
-        current=current,
-        heat=heat,
-        factors=factors,
-        change=change,
-        cooling=problem.thermal.stiffness + problem.thermal.loss + more,
-    )
-    exponent = EXPONENTS[problem.probe.stated] if heat.any() else 0
+    residual = outflow(problem.thermal, T) + away - power * (resistors.warms @ at.heat)
+    cooling = problem.thermal.stiffness + problem.thermal.loss + more
+    exponent = EXPONENTS[problem.probe.stated] if at.heat.any() else 0
     try:
-        matrix = splu(linearised(resistors, at, power, exponent))
+        matrix = splu(linearised(resistors, at, cooling, power, exponent, hot))
     except RuntimeError:  # singular: at a fold
         return None
     right = np.zeros(matrix.shape[0])
     right[len(at.free) : len(at.free) + len(inside)] = -residual[inside]
+    if hot is not None:
+        right[-1] = rise - T[hot]
+    solution = matrix.solve(right)
     correction = np.zeros(len(T))
-    correction[inside] = matrix.solve(right)[len(at.free) : len(at.free) + len(inside)]
-    return correction
+    correction[inside] = solution[len(at.free) : len(at.free) + len(inside)]
+    return correction, 0.0 if hot is None else float(solution[-1])

@@ -130,11 +130,11 @@ class Tangent:
     """(M + C,) of the resistances."""
     change: Any
     """(M + C, N) of the factors with the temperature."""
-    cooling: Any
-    """(N, N) tangent of what leaves each dof: conduction, contacts and losses."""
 
 
-def linearised(resistors: Resistors, at: Tangent, power: float, exponent: int) -> Any:
+def linearised(
+    resistors: Resistors, at: Tangent, cooling: Any, power: float, exponent: int, hot: int | None = None
+) -> Any:
     """Newton's matrix for potential, temperature and factors and, if `exponent` > 0, the relative change of `power`.
 
     With v the potential at 1 V, the currents i, conductances g and heats h at 1 V, the factors f and their change W
@@ -145,7 +145,9 @@ def linearised(resistors: Resistors, at: Tangent, power: float, exponent: int) -
         -W dT + df                                           = 0
         -(n / G) sum (h / f) df + dp / p                     = 0
 
-    where G = sum h, and G changes by -sum (h / f) df only, since the potential makes the power stationary.
+    where G = sum h, and G changes by -sum (h / f) df only, since the potential makes the power stationary; K is
+    `cooling` (N, N), the tangent of what leaves each dof. With `hot` the last row is dT of that dof, whose rise is
+    given in place of n.
     """
     D, H, S = resistors.difference, resistors.warms, resistors.factor
     D = D[:, at.free]
@@ -158,16 +160,18 @@ def linearised(resistors: Resistors, at: Tangent, power: float, exponent: int) -
     dT_df = power * (H @ heats)
     rows = [
         [dV, None, dV_df],
-        [dT_dv, at.cooling[at.inside][:, at.inside], dT_df],
+        [dT_dv, cooling[at.inside][:, at.inside], dT_df],
         [None, -at.change[:, at.inside], diags_array(np.ones(len(at.factors)))],
     ]
-    if exponent:
+    if exponent or hot is not None:
         column = -power * (H @ at.heat)
         rows[0].append(None)
         rows[1].append(csr_array(column[:, None]))
         rows[2].append(None)
-        total = float(at.heat.sum())
-        dG = np.asarray(heats.sum(axis=0)).ravel() * (-exponent / total)
+    if hot is not None:
+        rows.append([None, csr_array((at.inside == hot)[None, :].astype(np.float64)), None, None])
+    elif exponent:
+        dG = np.asarray(heats.sum(axis=0)).ravel() * (-exponent / float(at.heat.sum()))
         rows.append([None, None, csr_array(dG[None, :]), csr_array(np.ones((1, 1)))])
     return block_array(rows, format="csc")
 

@@ -148,6 +148,7 @@ def _states(study: Study) -> Markup:
         heat=_heat(study),
         ratings=_ratings(study),
         rise=_number(study.design.electrical.rated_rise),
+        linear=study.design.electrical.heating == LINEAR,
         effort=(*effort(study), *clamp_statement(study)),
         energy=energy_section(study),
     )
@@ -172,8 +173,7 @@ def _ratings(study: Study) -> dict[str, Any]:
     for record in study.records:
         rated = [(h.rated_current, h.rated_power, h.rated_power_density) for h in heating(study, record)]
         rows.append([record.name, *(_number(value) for each in rated for value in each)])
-    told = study.design.electrical.heating == LINEAR
-    return {"head": head, "rows": rows if told and _is_heater(study.design) else []}
+    return {"head": head, "rows": rows if _is_heater(study.design) else []}
 
 
 def _is_heater(design: Design) -> bool:

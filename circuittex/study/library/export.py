@@ -13,6 +13,7 @@ import numpy as np
 from circuittex.base.atomic import write_text
 from circuittex.base.errors import CircuittexWarning, DesignError
 from circuittex.base.version import __version__
+from circuittex.design.statement import NONLINEAR
 from circuittex.electrical.network.names import safe_name
 from circuittex.results.records import Study
 from circuittex.study.export import circuits_of, probe_netlist
@@ -119,6 +120,12 @@ def _checked(study: Study, state: str, ends: str, thin: float, dialects: Sequenc
         raise DesignError("thin", thin, "it must be an error from 0 to less than 1, such as 0.001")
     if not (0.0 < rise < np.inf):
         raise DesignError("rise", rise, "it must be > 0 K")
+    electrical = study.design.electrical
+    if electrical.heating == NONLINEAR and rise != electrical.rated_rise:
+        allowed = (
+            f"heating is nonlinear: currents are rated for electrical.rated_rise alone, {electrical.rated_rise:g} K"
+        )
+        raise DesignError("rise", rise, allowed)
     if unknown := [each for each in dialects if each not in DIALECTS]:
         raise DesignError("dialects", unknown[0], f"it must be one of {', '.join(DIALECTS)}")
     names = [record.name for record in study.records]

@@ -33,6 +33,7 @@ PURE = {
     *("Material.tolerance", "ContactLaw.tolerance", "MaterialPair.tolerance", "Yarn.crimp", "Yarn.heat_set"),
     "Electrical.permittivity",
     "Electrical.emissivity",
+    *("Fields.resistivity", "Fields.contact_resistivity"),
 }
 """Every field with pure numbers that are no counts. A field that is not here names its unit in the text below it."""
 

@@ -153,18 +153,16 @@ def _netlist(options: argparse.Namespace) -> ExitCode:
 
 def _netlist_text(study: Study, record: Record, options: argparse.Namespace) -> str:
     """The netlist that the options ask for."""
-    from circuittex.study.circuits import state_circuits
-    from circuittex.study.export import detailed_netlist, probe_netlist, reduced_netlist, simplified
+    from circuittex.study.export import circuits_of, detailed_netlist, probe_netlist, reduced_netlist
 
     design = study.design
     if options.kind == "reduced":
         return reduced_netlist(design, record.name, record.fit)
     length = None if options.resolution == "merged" else 0.0
-    simple = simplified(design, record.contacts, merge_length=length)
+    circuits = circuits_of(design, record.contacts, record.fields, merge_length=length)
     if options.kind == "subckt":
-        return detailed_netlist(design, record.name, state_circuits(simple), merge_length=length)
+        return detailed_netlist(design, record.name, circuits, merge_length=length)
     probe = _probe(record.driven(design), options.probe)
-    circuits = state_circuits(simple, design.terminals, [probe])
     return probe_netlist(design, record.name, circuits, probe, merge_length=length)
 
 
@@ -180,15 +178,15 @@ def _verify(options: argparse.Namespace) -> ExitCode:
     study = _load(options.results)
     records = _select(study, options.state)
     from circuittex.results.verification import AGREEMENT
-    from circuittex.study.export import simplified
+    from circuittex.study.export import fewer, warm_contacts
     from circuittex.study.verify import verify
 
     design = study.design
     checks = []
     print(f"{'state':<20} {'V per V':>8} {'current':>8} {'merging':>8} {'mesh':>8}  routes")
     for record in records:
-        simple = simplified(design, record.contacts)
-        check = verify(record.contacts, simple.contacts, design.terminals, record.driven(design).probes)
+        warm = warm_contacts(record.contacts, record.fields)
+        check = verify(warm, fewer(design, warm), design.terminals, record.driven(design).probes)
         differences = check.max_voltage_difference, check.max_current_difference
         checks.append(check)
         numbers = [*differences, check.merge_error, check.field_difference]

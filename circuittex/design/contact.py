@@ -39,7 +39,7 @@ class ContactProperties:
     tc1: float = field(
         default=0.0,
         kw_only=True,
-        metadata=coefficient(1, "of the resistance of contacts, per kelvin from 27 C; for exported parts only"),
+        metadata=coefficient(1, "of the resistance of contacts, per kelvin from 27 C; as a material's"),
     )
     """Linear temperature coefficient of the resistance 1/sigma_c, 1/K: times
     1 + tc1 dT + tc2 dT^2, dT from 27 C, SPICE's tnom."""

@@ -23,6 +23,8 @@ FORMAT = 1
 """The layout described by the starter design."""
 AUTO = "auto"
 """Stands for a length that follows from the weave."""
+LINEAR, NONLINEAR = "linear", "nonlinear"
+"""How temperatures follow from heat (`Electrical.heating`)."""
 MOST_ELEMENTS = 500_000
 """Elements of a whole fabric: what a large workstation can hold."""
 
@@ -87,6 +89,18 @@ class Electrical:
         ),
     )
     """'cold': fibril ends stay as cool as the surroundings; 'insulated'; or the resistance of each yarn end, K/W."""
+    heating: str = field(
+        default=LINEAR,
+        kw_only=True,
+        metadata=choice(
+            '"linear": resistances as stated, those of 27 C, and radiation linear in the rise; "nonlinear": they '
+            "follow tc1 and tc2 to the temperatures of each probe, and radiation goes with T^4",
+            (LINEAR, NONLINEAR),
+            shown=LINEAR,
+        ),
+    )
+    """'linear': resistances as stated, those of 27 C, and radiation linear in the rise; 'nonlinear': resistances follow
+    tc1 and tc2 to the temperatures that each probe makes, and radiation goes with T^4."""
     permittivity: float = field(
         default=1.0,
         kw_only=True,
@@ -309,6 +323,7 @@ class Design:
         self._check_packing()
         check_clamps(self.clamps, self.weave, self.loading)
         self._check_pairs()
+        self._check_heating()
         check_terminals(self.terminals, self.weave)
         check_probes(self.probes, self.terminals, self.weave)
 
@@ -390,6 +405,15 @@ class Design:
                         map(repr, known)
                     )
                     raise refuse("contact.pairs.materials", material, allowed)
+
+    def _check_heating(self) -> None:
+        electrical, fibrils = self.electrical, [each for yarn in self.weave.yarns for each in yarn.fibrils]
+        follows = any(each.tc1 or each.tc2 for each in fibrils) or any(
+            each.tc1 or each.tc2 for each in (self.contact, *self.contact.pairs)
+        )
+        if electrical.heating == NONLINEAR and not (electrical.emissivity or follows):
+            allowed = "nothing of the design is nonlinear: state tc1 or tc2 of what conducts, or electrical.emissivity"
+            raise refuse("electrical.heating", electrical.heating, allowed)
 
 
 def design_hash(design: Design) -> str:

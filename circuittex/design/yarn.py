@@ -80,7 +80,7 @@ class Material:
     """k, W/(mm K)."""
     tc1: float = field(
         default=0.0,
-        metadata=coefficient(1, "of the resistivity, per kelvin from 27 C; for exported parts only"),
+        metadata=coefficient(1, "of the resistivity, per kelvin from 27 C; for parts, and `electrical.heating`"),
     )
     """Linear temperature coefficient of the resistivity, 1/K: times
     1 + tc1 dT + tc2 dT^2, dT from 27 C, SPICE's tnom."""

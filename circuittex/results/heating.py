@@ -57,8 +57,7 @@ def heating(study: Study, record: Record) -> tuple[Heating, ...]:
 
 
 def _heating(field: Fields, area: float, rise: float) -> Heating:
-    current, times = float(field.currents[0]), rating(field, rise)
-    power = field.voltage * current * times * times
+    current, power = rating(field, rise)
     return Heating(
         probe=field.probe,
         power=field.heat,
@@ -66,7 +65,7 @@ def _heating(field: Fields, area: float, rise: float) -> Heating:
         along=field.heat_lost / field.heat if field.heat > 0.0 else float("nan"),
         rise=field.peak_temperature,
         voltage=field.voltage,
-        rated_current=abs(current) * times,
+        rated_current=current,
         rated_power=power,
         rated_power_density=PER_CM2 * power / area,
     )
@@ -88,16 +87,22 @@ def fabric_area(design: Design, gradient: Floats) -> float:
     return warps.crossings * warps.step * wefts.crossings * wefts.step * float(np.linalg.det(gradient))
 
 
-def rating(field: Fields, rise: float) -> float:
-    """How many times its voltage and current a probe may have for a largest temperature rise of `rise`, K.
+def rating(field: Fields, rise: float) -> tuple[float, float]:
+    """The current, A, and the power of its source, W, with which a probe's largest temperature rise is `rise`, K.
 
     The equations of a probe are linear and its heat is quadratic in the voltage: the rise goes with the square of
-    voltage and current, hence sqrt(rise / peak). nan where nothing is warmed.
+    voltage and current, hence by sqrt(rise / peak). Where they are not linear these were solved for with the fields,
+    for one rise. nan where nothing is warmed, and for other rises than that.
     """
-    return float(np.sqrt(rise / field.peak_temperature)) if field.peak_temperature > 0.0 else float("nan")
+    current = float(field.currents[0])
+    if len(field.rated):
+        stated, rated, power = field.rated.tolist()
+        return (rated, power) if stated == rise else (float("nan"), float("nan"))
+    times = float(np.sqrt(rise / field.peak_temperature)) if field.peak_temperature > 0.0 else float("nan")
+    return abs(current) * times, field.voltage * current * times * times
 
 
 def rated_currents(study: Study, rise: float) -> Floats:
     """(S, n) current in A of each probe in each state at which the largest temperature rise is `rise`, K; nan where
-    nothing is warmed."""
-    return np.array([[abs(float(f.currents[0])) * rating(f, rise) for f in record.fields] for record in study.records])
+    nothing is warmed, and for another rise than the design's where heating is nonlinear."""
+    return np.array([[rating(f, rise)[0] for f in record.fields] for record in study.records])

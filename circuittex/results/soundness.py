@@ -8,6 +8,7 @@ from circuittex.base.arrays import Floats
 from circuittex.base.frozen import frozen
 from circuittex.contact.state import ContactState
 from circuittex.design import Design
+from circuittex.design.statement import NONLINEAR
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.results.heating import driven_otherwise, fabric_area
 from circuittex.results.records import Record, Study
@@ -114,8 +115,10 @@ def widest_on_shell(study: Study, contacts: ContactState) -> float:
 def _unreal(design: Design) -> str:
     """What else is not as in a room where fibrils get hot."""
     if design.electrical.heat_loss or design.electrical.emissivity:
-        return "polymers have melted or charred, and "
-    return "no heat is lost to the air (electrical.heat_loss) and "
+        reason = "polymers have melted or charred"
+    else:
+        reason = "no heat is lost to the air (electrical.heat_loss)"
+    return reason if design.electrical.heating == NONLINEAR else f"{reason}, and conductivities are constant"
 
 
 def _not_driven(study: Study, record: Record) -> list[str]:
@@ -168,8 +171,8 @@ def doubts(study: Study, record: Record) -> tuple[Doubt, ...]:
         Doubt(
             "temperature",
             rise / HOT,
-            f"the temperature rises by up to {rise:.3g} K (warned of from {HOT:g} K on): {_unreal(study.design)}"
-            "conductivities are constant, so that this is no prediction",
+            f"the temperature rises by up to {rise:.3g} K (warned of from {HOT:g} K on): {_unreal(study.design)}, "
+            "so that this is no prediction",
         ),
         Doubt(
             "drive",

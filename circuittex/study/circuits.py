@@ -22,8 +22,12 @@ class StateCircuits:
     """The contacts."""
     yarn_ends: Circuit
     """Fibril segments and contacts, with one port for each yarn end."""
+    names: tuple[str, ...]
+    """(n,) names of the probes."""
     probes: tuple[Circuit, ...]
-    """That of each probe, its source the first port and its sink the second."""
+    """(n,) that of each probe, its source the first port and its sink the second."""
+    seen: tuple[Simplified, ...]
+    """(n,) the contacts of these: `simple`, unless resistances follow the temperatures that the probe makes."""
 
     @property
     def conducting(self) -> Circuit:
@@ -32,21 +36,39 @@ class StateCircuits:
 
     def of(self, probe: Probe) -> Circuit:
         """The circuit of a probe."""
-        return next(circuit for circuit in self.probes if circuit.ports == (probe.source, probe.sink))
+        return self.probes[self.names.index(probe.name)]
+
+    def seen_by(self, probe: Probe) -> Simplified:
+        """The contacts of a probe's circuit."""
+        return self.seen[self.names.index(probe.name)]
 
 
 def state_circuits(
-    simple: Simplified, terminals: Sequence[Terminal] = (), probes: Sequence[Probe] = ()
+    simple: Simplified,
+    terminals: Sequence[Terminal] = (),
+    probes: Sequence[Probe] = (),
+    seen: Sequence[Simplified] = (),
 ) -> StateCircuits:
-    """The circuits of a state for these probes between `terminals`."""
-    choices = [yarn_end_terminals(simple.contacts.mesh), *_pairs(terminals, probes)]
+    """The circuits of a state for these probes between `terminals`; `seen`: the contacts as each probe has them, where
+    these are not `simple`."""
+    pairs, names = _pairs(terminals, probes), tuple(probe.name for probe in probes)
+    choices = [yarn_end_terminals(simple.contacts.mesh), *(() if seen else pairs)]
     yarn_ends, *others = build_circuits(simple.contacts, choices, dropped_contacts=simple.dropped_contacts)
-    return StateCircuits(simple, yarn_ends, tuple(others))
+    for each, pair in zip(seen, pairs, strict=True) if seen else ():
+        others += build_circuits(each.contacts, [pair], dropped_contacts=each.dropped_contacts)
+    return StateCircuits(simple, yarn_ends, names, tuple(others), tuple(seen) or (simple,) * len(names))
 
 
-def probe_circuits(contacts: ContactState, terminals: Sequence[Terminal], probes: Sequence[Probe]) -> list[Circuit]:
-    """The circuit of each probe: its two terminals are joined, all other fibril ends insulated."""
-    return build_circuits(contacts, _pairs(terminals, probes))
+def probe_circuits(
+    contacts: ContactState | Sequence[ContactState], terminals: Sequence[Terminal], probes: Sequence[Probe]
+) -> list[Circuit]:
+    """The circuit of each probe: its two terminals are joined, all other fibril ends insulated.
+
+    `contacts`: of all probes, or of each its own."""
+    pairs = _pairs(terminals, probes)
+    if isinstance(contacts, ContactState):
+        return build_circuits(contacts, pairs)
+    return [build_circuits(each, [pair])[0] for each, pair in zip(contacts, pairs, strict=True)]
 
 
 def conducting_ends(mesh: FibrilMesh) -> tuple[Terminal, ...]:

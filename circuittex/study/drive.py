@@ -11,7 +11,14 @@ from circuittex.base.errors import CircuitError
 from circuittex.contact.state import ContactState
 from circuittex.design import Design, Probe
 from circuittex.design.probe import HIGHEST_VOLTAGE
-from circuittex.electrical.fields import Potential, solve_potentials
+from circuittex.electrical.fields import (
+    Fields,
+    Potential,
+    coefficients_of,
+    cooling_of,
+    solve_potentials,
+    solve_steady,
+)
 from circuittex.electrical.network.circuit import Circuit
 from circuittex.electrical.network.nodal import solve_nodal
 from circuittex.electrical.network.one_pair import yarn_conductance
@@ -20,6 +27,8 @@ from circuittex.study.circuits import probe_circuits
 
 SMALL = 1e-6
 """A probe with less than this part of a yarn's current: its digits are not those of the fields."""
+CARRIED = 0.01
+"""Relative difference of a current from what is stated: small ones are those of a solution with more digits."""
 NOTHING = 1e-12
 """A probe with less than this part of a yarn's conductance carries no current: it is rounding of the solution."""
 
@@ -45,6 +54,34 @@ def at_voltages(design: Design, contacts: ContactState, gradient: Floats) -> Des
     return replace(
         design, probes=tuple(probe if probe.voltage else probe.at(volts[probe.name]) for probe in design.probes)
     )
+
+
+def steady_fields(
+    stated: Design, cold: Design, contacts: ContactState, potentials: Sequence[Potential], area: float = 0.0
+) -> tuple[Fields, ...]:
+    """The fields of a nonlinear design's probes at the temperatures that follow from them (`solve_steady`).
+
+    `cold`: the design at the voltages that drive its probes at 27 C, with these `potentials`; a probe that does not
+    carry there what is `stated` has nothing to carry it, and is driven by that voltage. `area` of the fabric, mm2.
+    """
+    cooling, coefficients = cooling_of(stated, contacts.mesh), coefficients_of(stated, contacts)
+    found = []
+    for probe, at, potential in zip(stated.probes, cold.probes, potentials, strict=True):
+        current = probe.current or (probe.power_density or 0.0) * area / at.voltage
+        carried = abs(float(potential.currents[0]) - current) < CARRIED * abs(current)
+        found.append(
+            solve_steady(
+                contacts,
+                stated.terminals,
+                probe if probe.voltage or carried else at,
+                coefficients,
+                cooling=cooling,
+                area=area,
+                contact_heat=stated.electrical.contact_heat,
+                rise=stated.electrical.rated_rise,
+            )
+        )
+    return tuple(found)
 
 
 def _voltage(probe: Probe, conductance: float, area: float) -> float:

@@ -13,12 +13,16 @@ from circuittex.base.atomic import write_text
 from circuittex.contact.merge import Simplified, simplify
 from circuittex.contact.state import ContactState
 from circuittex.design import Design, Probe, design_hash
+from circuittex.design.statement import NONLINEAR
+from circuittex.electrical.fields import Fields, at_temperatures
 from circuittex.electrical.network.circuit import with_ports
 from circuittex.fit import Fit
 from circuittex.netlist import Header, deck, subcircuit
-from circuittex.study.circuits import StateCircuits
+from circuittex.study.circuits import StateCircuits, state_circuits
 
 JOINED = "every yarn end is one pin that joins its fibrils; the probe decks join those of their two terminals only"
+COLD = "resistances are those at 27 C; those at the temperatures that a probe makes are in its own deck"
+WARM = "resistances are those at the temperatures that the probe makes; at another voltage they are others"
 
 
 def simplified(design: Design, contacts: ContactState, *, merge_length: float | None = None) -> Simplified:
@@ -32,9 +36,35 @@ def simplified(design: Design, contacts: ContactState, *, merge_length: float | 
     )
 
 
+def circuits_of(
+    design: Design, contacts: ContactState, fields: Sequence[Fields], *, merge_length: float | None = None
+) -> StateCircuits:
+    """The circuits of a state with these `fields` of the design's probes: between yarn ends at 27 C, those of probes
+    with the resistances that they have at the temperatures of the fields. `merge_length` as for `simplified`."""
+    simple = simplified(design, contacts, merge_length=merge_length)
+    warm = warm_contacts(contacts, fields)
+    seen = () if isinstance(warm, ContactState) else [simplified(design, w, merge_length=merge_length) for w in warm]
+    return state_circuits(simple, design.terminals, design.probes, seen)
+
+
+def warm_contacts(contacts: ContactState, fields: Sequence[Fields]) -> ContactState | list[ContactState]:
+    """The contacts as each of the probes has them; once for all where nothing follows their temperatures."""
+    if not any(len(field.resistivity) for field in fields):
+        return contacts
+    return [at_temperatures(contacts, field) for field in fields]
+
+
+def fewer(design: Design, contacts: ContactState | Sequence[ContactState]) -> ContactState | list[ContactState]:
+    """The contacts of `simplified`, of one state or of each."""
+    if isinstance(contacts, ContactState):
+        return simplified(design, contacts).contacts
+    return [simplified(design, each).contacts for each in contacts]
+
+
 def detailed_netlist(design: Design, state: str, circuits: StateCircuits, *, merge_length: float | None = None) -> str:
     """The `.subckt` with a pin for each yarn end; `merge_length` as it was given to `simplified`, for the header."""
-    notes = (JOINED, *_simplification(design, circuits.simple, merge_length))
+    cold = (COLD,) if design.electrical.heating == NONLINEAR else ()
+    notes = (JOINED, *cold, *_simplification(design, circuits.simple, merge_length))
     header = _header(design, state)("detailed resistor network of fibril segments and contacts", notes=notes)
     return subcircuit(circuits.yarn_ends, f"{state_word(state)} {design.name}", header)
 
@@ -49,7 +79,8 @@ def probe_netlist(
     """
     pins = [terminal.name for terminal in design.terminals if terminal.name in (probe.source, probe.sink)]
     circuit = with_ports(circuits.of(probe), pins)
-    notes = (*_drive(design, probe), *_simplification(design, circuits.simple, merge_length))
+    warm = (WARM,) if design.electrical.heating == NONLINEAR else ()
+    notes = (*_drive(design, probe), *warm, *_simplification(design, circuits.seen_by(probe), merge_length))
     header = _header(design, state)(f"detailed resistor network, probe {probe.name}", notes=notes)
     return deck(circuit, {probe.source: probe.voltage, probe.sink: 0.0}, header)
 
@@ -57,7 +88,8 @@ def probe_netlist(
 def reduced_netlist(design: Design, state: str, fit: Fit) -> str:
     """The `.subckt` of the reduced network [43-46], one pin for each yarn end."""
     circuit = fit.circuit()
-    notes = (*_values(fit), *fit.warnings)
+    cold = (COLD,) if design.electrical.heating == NONLINEAR else ()
+    notes = (*_values(fit), *cold, *fit.warnings)
     header = _header(design, state)("reduced network of yarn segments and crossings", notes=notes)
     return subcircuit(circuit, f"{state_word(state)} reduced {design.name}", header)
 

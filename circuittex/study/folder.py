@@ -21,8 +21,8 @@ from circuittex.results.store import (
 )
 from circuittex.results.summary import write_summary
 from circuittex.results.vtk.vtu import write_collections, write_vtu
-from circuittex.study.circuits import StateCircuits, state_circuits
-from circuittex.study.export import netlist_files, simplified, write_netlists
+from circuittex.study.circuits import StateCircuits
+from circuittex.study.export import circuits_of, netlist_files, write_netlists
 
 MARKS = {
     "netlists/*.sub": b"* circuittex ",
@@ -114,7 +114,7 @@ def write_state(folder: Path, study: Study, record: Record, circuits: StateCircu
     files = netlist_files(design, record.name, record.fit)
     if not all((folder / "netlists" / name).exists() for name in files):
         if circuits is None:
-            circuits = state_circuits(simplified(design, record.contacts), design.terminals, design.probes)
+            circuits = circuits_of(design, record.contacts, record.fields)
         driven = record.driven(design).probes
         write_netlists(folder / "netlists", design, record.name, circuits, record.fit, driven)
     vtu = folder / "vtu" / f"{record.name}.vtu"

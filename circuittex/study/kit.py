@@ -21,8 +21,7 @@ from circuittex.electrical.network.nodal import solve_nodal
 from circuittex.netlist import Header, deck, pin_names
 from circuittex.results.records import Record, Study
 from circuittex.study import compare
-from circuittex.study.circuits import state_circuits
-from circuittex.study.export import simplified
+from circuittex.study.export import circuits_of
 
 FILES = ("deck.cir", "graph.json", "matrix.mtx", "right_hand_side.mtx", "unknowns.txt", "expected.csv")
 """What there is of each circuit."""
@@ -168,7 +167,7 @@ def _record(study: Study, state: str | None) -> Record:
 def _cell(study: Study, record: Record) -> tuple[Circuit, dict[str, float], str]:
     """The circuit of the first probe that drives a current, its drive, and the probe's name."""
     design = record.driven(study.design)
-    circuits = state_circuits(simplified(design, record.contacts), design.terminals, design.probes)
+    circuits = circuits_of(design, record.contacts, record.fields)
     for probe in design.probes:
         circuit = circuits.of(probe)
         if circuit.n_resistors:

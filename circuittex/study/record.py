@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from circuittex.base.errors import ConvergenceError, PenetrationError
+from circuittex.base.errors import ConvergenceError, DesignError, PenetrationError
 from circuittex.base.frozen import frozen
 from circuittex.contact.extract import contacts_of
+from circuittex.contact.state import ContactState
 from circuittex.design import Design
-from circuittex.electrical.fields import cooling_of, solve_probes
-from circuittex.electrical.network.circuit import build_circuit
+from circuittex.design.statement import NONLINEAR
+from circuittex.electrical.fields import Fields, Potential, cooling_of, solve_potentials, solve_probes
+from circuittex.electrical.network.circuit import Circuit, build_circuit
 from circuittex.electrical.network.ports import port_matrix
 from circuittex.fit import fit_network
 from circuittex.geometry.levels import levels
@@ -20,11 +22,13 @@ from circuittex.mech.configuration import Configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.relaxation.increment import Increment, advance
 from circuittex.relaxation.relax import Equilibrium, clamp_force, relax
+from circuittex.results.heating import fabric_area
 from circuittex.results.outcome import Outcome, outcome
 from circuittex.results.records import Record, Study
-from circuittex.study.circuits import StateCircuits, conducting_ends, probe_circuits, state_circuits
-from circuittex.study.drive import at_voltages, told_currents
-from circuittex.study.export import detailed_file, simplified
+from circuittex.results.verification import Verification
+from circuittex.study.circuits import StateCircuits, conducting_ends, probe_circuits
+from circuittex.study.drive import at_voltages, steady_fields, told_currents
+from circuittex.study.export import circuits_of, detailed_file, simplified, warm_contacts
 from circuittex.study.plan import Step
 from circuittex.study.soundness import check_sound
 from circuittex.study.verify import field_convergence, verify
@@ -101,29 +105,15 @@ def record_state(study: Study, step: Step, reached: Increment, say: Callable[[st
     contacts = contacts_of(study.design, mesh, equilibrium.configuration)
     check_sound(study, step, equilibrium.configuration.r, contacts)
     design = at_voltages(study.design, contacts, step.after)
-    fields = solve_probes(
-        contacts,
-        design.terminals,
-        design.probes,
-        contact_heat=design.electrical.contact_heat,
-        cooling=cooling_of(design, mesh),
-    )
-    circuits = state_circuits(simplified(design, contacts), design.terminals, design.probes)
+    cold, fields = _fields(study.design, design, contacts, step)
+    circuits = circuits_of(design, contacts, fields)
     whole = probe_circuits(contacts, design.terminals, design.probes)
     ports = port_matrix(circuits.conducting)
-    fit = fit_network(told_currents(fields, whole, design), design, ports)
+    fit = fit_network(told_currents(cold, whole, design), design, ports)
     convergence = np.empty((0, 2))
     if not step.loading:
-        convergence = field_convergence(contacts, design.terminals, design.probes, fields)
-    verification = verify(
-        contacts,
-        circuits.simple.contacts,
-        design.terminals,
-        design.probes,
-        fields=fields,
-        circuits=whole,
-        simplified_circuits=circuits.probes,
-    )
+        convergence = field_convergence(contacts, design.terminals, design.probes, cold)
+    verification = _verified(design, contacts, fields, whole, circuits)
     record = Record(
         name=step.name,
         loading=step.loading,
@@ -151,13 +141,61 @@ def record_state(study: Study, step: Step, reached: Increment, say: Callable[[st
     return Recorded(record, circuits)
 
 
+def _verified(
+    design: Design,
+    contacts: ContactState,
+    fields: Sequence[Fields],
+    whole: Sequence[Circuit],
+    circuits: StateCircuits,
+) -> Verification:
+    """The comparison of the routes: on the same contacts for all probes or, where resistances follow the temperatures,
+    on those of each, at the voltages of the fields. `whole`: the circuits of the former."""
+    warm, few = warm_contacts(contacts, fields), [each.contacts for each in circuits.seen]
+    probes = tuple(probe.at(field.voltage) for probe, field in zip(design.probes, fields, strict=True))
+    one = isinstance(warm, ContactState)
+    return verify(
+        warm,
+        circuits.simple.contacts if one else few,
+        design.terminals,
+        design.probes if one else probes,
+        fields=fields,
+        circuits=whole if one else probe_circuits(warm, design.terminals, probes),
+        simplified_circuits=circuits.probes,
+    )
+
+
+def _fields(
+    stated: Design, design: Design, contacts: ContactState, step: Step
+) -> tuple[Sequence[Potential], tuple[Fields, ...]]:
+    """The potentials of the probes at 27 C, as the fit wants them, and the fields: the same where these are linear.
+
+    `stated` and `design`: the probes as they are stated, and driven by the voltages that do so at 27 C.
+    """
+    electrical = design.electrical
+    if electrical.heating == NONLINEAR:
+        cold = solve_potentials(contacts, design.terminals, design.probes)
+        try:
+            return cold, steady_fields(stated, design, contacts, cold, fabric_area(design, step.after))
+        except DesignError as error:
+            raise DesignError(error.field, error.value, f"in the state {step.name!r} {error.allowed}") from error
+    fields = solve_probes(
+        contacts,
+        design.terminals,
+        design.probes,
+        contact_heat=electrical.contact_heat,
+        cooling=cooling_of(design, contacts.mesh),
+    )
+    return fields, fields
+
+
 def outcome_of(design: Design, mesh: FibrilMesh, equilibrium: Equilibrium) -> Outcome:
     """The numbers of an equilibrium and nothing else, for one that is not recorded; probes are driven by voltages."""
     contacts = contacts_of(design, mesh, equilibrium.configuration)
-    fields = solve_probes(contacts, design.terminals, design.probes, contact_heat=design.electrical.contact_heat)
+    cold: Sequence[Potential] = solve_potentials(contacts, design.terminals, design.probes)
+    fields = steady_fields(design, design, contacts, cold) if design.electrical.heating == NONLINEAR else cold
     currents = tuple(float(field.currents[0]) for field in fields)
     merged = simplified(design, contacts).contacts
-    told = told_currents(fields, probe_circuits(contacts, design.terminals, design.probes), design)
+    told = told_currents(cold, probe_circuits(contacts, design.terminals, design.probes), design)
     fit = fit_network(told, design, port_matrix(build_circuit(merged, conducting_ends(mesh))))
     return outcome(clamp_force(mesh, equilibrium.reaction), currents, fit, equilibrium.energy)
 

@@ -15,6 +15,7 @@ from circuittex.base.frozen import frozen
 from circuittex.contact.state import ContactState
 from circuittex.design import Probe, Terminal
 from circuittex.electrical.fields import Fields, Potential, solve_potentials
+from circuittex.electrical.fields.solution import Mesh
 from circuittex.electrical.network.circuit import Circuit
 from circuittex.electrical.network.nodal import rounding_errors, solve_nodal
 from circuittex.electrical.spice.ngspice import run_decks
@@ -47,8 +48,8 @@ class _Answer:
 
 
 def verify(
-    contacts: ContactState,
-    simplified: ContactState,
+    contacts: ContactState | Sequence[ContactState],
+    simplified: ContactState | Sequence[ContactState],
     terminals: Sequence[Terminal],
     probes: Sequence[Probe],
     *,
@@ -60,7 +61,8 @@ def verify(
     """Compare finite elements, nodal analysis and ngspice for each probe.
 
     All three solve the `simplified` contacts, each from them alone; finite elements and nodal analysis also
-    solve all `contacts`, and the differences are the largest of either. Every probe has a circuit of its own,
+    solve all `contacts`, and the differences are the largest of either. Both are those of all probes, or of each probe
+    its own where resistances follow the temperatures that it makes. Every probe has a circuit of its own,
     since it joins only its own two terminals. ngspice answers all of them in one process within `timeout`
     seconds; where it does not, `ngspice_checked` is False and `note` says why. Its double precision is not refined,
     so that the circuit limits what it can confirm (`ngspice_limit`, see `rounding_errors`); the limit never loosens
@@ -72,10 +74,10 @@ def verify(
         nan = float("nan")
         return Verification((), nan, nan, nan, 0.0, nan, nan, 0.0, 0.0, nan, False, "there are no probes to verify")
     clock = _Clock()
-    coarse = clock("fields", solve_potentials, contacts, terminals, probes, mesh="mechanical")
-    full = clock("fields", solve_potentials, contacts, terminals, probes) if fields is None else fields
+    coarse = clock("fields", _potentials, contacts, terminals, probes, mesh="mechanical")
+    full = clock("fields", _potentials, contacts, terminals, probes) if fields is None else fields
     whole = probe_circuits(contacts, terminals, probes) if circuits is None else circuits
-    merged = clock("fields", solve_potentials, simplified, terminals, probes)
+    merged = clock("fields", _potentials, simplified, terminals, probes)
     small = probe_circuits(simplified, terminals, probes) if simplified_circuits is None else simplified_circuits
     try:
         full_fields, full_nodal = _native(clock, whole, probes, full)
@@ -122,6 +124,19 @@ def verify(
     return replace(found, note=_note(found))
 
 
+def _potentials(
+    contacts: ContactState | Sequence[ContactState],
+    terminals: Sequence[Terminal],
+    probes: Sequence[Probe],
+    mesh: Mesh = "feet",
+) -> tuple[Potential, ...]:
+    """`solve_potentials`, on the same contacts for all probes or on those of each."""
+    if isinstance(contacts, ContactState):
+        return solve_potentials(contacts, terminals, probes, mesh=mesh)
+    pairs = zip(contacts, probes, strict=True)
+    return tuple(solve_potentials(each, terminals, [probe], mesh=mesh)[0] for each, probe in pairs)
+
+
 def _unresolved(reason: str, clock: _Clock) -> Verification:
     """What is left where resistances are too far apart for the digits of nodal analysis: nothing to compare with."""
     nan = float("nan")
@@ -149,7 +164,7 @@ def _note(found: Verification) -> str:
 
 
 def field_convergence(
-    contacts: ContactState, terminals: Sequence[Terminal], probes: Sequence[Probe], fields: Sequence[Fields]
+    contacts: ContactState, terminals: Sequence[Terminal], probes: Sequence[Probe], fields: Sequence[Potential]
 ) -> Floats:
     """How the potential on the mechanical mesh converges to the circuit: (3, 2) node distance mm, current error.
 
@@ -241,9 +256,9 @@ def _difference(a: Sequence[_Answer], b: Sequence[_Answer], yarn: Floats) -> tup
     return float(np.max(voltage, initial=0.0)), _relative([x.current for x in a], [y.current for y in b], yarn)
 
 
-def _yarn_currents(contacts: ContactState, probes: Sequence[Probe]) -> Floats:
-    """What the best of the yarns would carry alone at the voltage of each probe, A."""
-    mesh = contacts.mesh
+def _yarn_currents(contacts: ContactState | Sequence[ContactState], probes: Sequence[Probe]) -> Floats:
+    """What the best of the yarns would carry alone at the voltage of each probe, and at 27 C, A."""
+    mesh = contacts.mesh if isinstance(contacts, ContactState) else contacts[0].mesh
     conductance = np.bincount(mesh.yarn, mesh.electrical_conductivity * mesh.area / mesh.length)
     currents: Floats = conductance.max(initial=0.0) * np.abs(np.array([probe.voltage for probe in probes]))
     return currents

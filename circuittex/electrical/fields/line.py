@@ -24,6 +24,8 @@ class FibrilLine:
     """(K,) axis coordinate, mm."""
     segments: Ints
     """(S, 2) node numbers of each element."""
+    element: Ints
+    """(S,) element of the mechanics in which each lies."""
     conduction: Floats
     """(S,) sigma A times axial factor, S mm."""
     thermal: Floats
@@ -57,6 +59,7 @@ def fibril_line(contacts: ContactState, *, refine: bool, elements: bool = False)
         fibril=fibril,
         xi=xi,
         segments=segments,
+        element=element,
         conduction=(mesh.electrical_conductivity * mesh.area)[owner] * contacts.axial_factor[element],
         thermal=(mesh.thermal_conductivity * mesh.area)[owner],
         ends=np.stack([np.searchsorted(fibril, np.arange(mesh.n_fibrils), side) for side in ("left", "right")])

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import connected_components
-from skfem import Basis, ElementLineP1, ElementLineP2, MeshLine
+from skfem import Basis, ElementLineP2, MeshLine
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.errors import DesignError
@@ -18,23 +16,12 @@ from circuittex.base.frozen import frozen
 from circuittex.contact.state import ContactState
 from circuittex.design import Probe, Terminal
 from circuittex.electrical.fields.cooling import COLD_ENDS, Cooling
+from circuittex.electrical.fields.flow import Flow, flows_of, joule_heat
 from circuittex.electrical.fields.line import FibrilLine, fibril_line
-from circuittex.electrical.fields.system import (
-    System,
-    balance,
-    build_system,
-    constant_source,
-    outflow,
-    peak,
-    surface_loss,
-)
-from circuittex.geometry.mesh import FibrilMesh
+from circuittex.electrical.fields.system import System, balance, build_system, outflow, peak, surface_loss
 
 Mesh = Literal["feet", "mechanical"]
 """Nodes at the feet of the contacts, or those of the mechanics."""
-
-WEAK = 1e-10
-"""Contacts of a fibril this much weaker than a segment keep six digits in the matrix, which is enough to refine."""
 
 
 @frozen
@@ -77,6 +64,13 @@ class Fields(Potential):
     """(U,) conducting fibrils that no driven terminal reaches."""
     heat_lost: float = 0.0
     """Heat that leaves along the fibrils, W."""
+    resistivity: Floats = field(default_factory=lambda: np.empty(0))
+    """(M,) mean resistivity of each element of the fibrils over that at 27 C; empty where it follows no temperature."""
+    contact_resistivity: Floats = field(default_factory=lambda: np.empty(0))
+    """(C,) resistance of each contact over that at 27 C; empty where it follows no temperature."""
+    rated: Floats = field(default_factory=lambda: np.empty(0))
+    """(3,) a rise of the hottest point, and the current and the power of the source with which it has that [K, A, W];
+    empty where the fields are linear, from which these follow."""
 
 
 def solve_fields(
@@ -127,20 +121,22 @@ def solve_probes(
 
     Raises DesignError where a probe names a terminal, or a terminal a yarn end, that does not exist.
     """
-    line, axes = _line(contacts, mesh, elements=len(cooling.loss) > 0)
+    if len(cooling.radiating):
+        raise DesignError("cooling.radiating", cooling.radiating.max(), "radiation by T^4 is for `solve_steady`")
+    line, axes = line_of(contacts, mesh, elements=len(cooling.loss) > 0)
     if not probes:
         return ()
-    flows = _flows(contacts, line, axes, terminals, probes)
+    flows = flows_of(contacts, line, axes, terminals, probes)
     thermal = build_system(Basis(axes, ElementLineP2()), line, line.thermal, contacts.heat_conductance)
-    loads = np.stack([_joule_heat(thermal, flow, contact_heat) for flow in flows])
+    loads = np.stack([joule_heat(thermal, flow, contact_heat) for flow in flows])
     every = np.arange(loads.shape[1])
-    surface, through, held = _losses(line, thermal, cooling)
+    surface, through, held = losses(line, thermal, cooling)
     if len(cooling.loss) or not held:
         thermal = replace(thermal, loss=surface + through)
     inside = np.delete(every, line.ends) if held else every
     temperatures = balance(thermal, loads, np.zeros(loads.shape[1]), inside)
     return tuple(
-        _fields(line, thermal, surface, cooling, *one) for one in zip(probes, flows, loads, temperatures, strict=True)
+        fields_of(line, thermal, surface, cooling, *one) for one in zip(probes, flows, loads, temperatures, strict=True)
     )
 
 
@@ -152,14 +148,14 @@ def solve_potentials(
     mesh: Mesh = "feet",
 ) -> tuple[Potential, ...]:
     """The potentials and currents of `solve_probes`, for whoever has no use for the temperatures."""
-    line, axes = _line(contacts, mesh)
+    line, axes = line_of(contacts, mesh)
     return tuple(
         Potential(**_electric(line, probe, flow))
-        for probe, flow in zip(probes, _flows(contacts, line, axes, terminals, probes), strict=True)
+        for probe, flow in zip(probes, flows_of(contacts, line, axes, terminals, probes), strict=True)
     )
 
 
-def _losses(line: FibrilLine, thermal: System, cooling: Cooling) -> tuple[Any, Any, bool]:
+def losses(line: FibrilLine, thermal: System, cooling: Cooling) -> tuple[Any, Any, bool]:
     """(N, N) each: what leaves along the fibrils, and through their ends; and whether these are held at T = 0."""
     n = thermal.basis.N
     surface = through = csr_matrix((n, n))
@@ -171,7 +167,7 @@ def _losses(line: FibrilLine, thermal: System, cooling: Cooling) -> tuple[Any, A
     return surface, through, not len(cooling.end)
 
 
-def _line(contacts: ContactState, mesh: Mesh, elements: bool = False) -> tuple[FibrilLine, MeshLine]:
+def line_of(contacts: ContactState, mesh: Mesh, elements: bool = False) -> tuple[FibrilLine, MeshLine]:
     """The line mesh of all fibrils, and the same for scikit-fem."""
     if mesh not in ("feet", "mechanical"):
         raise DesignError("mesh", mesh, "allowed are 'feet' and 'mechanical'")
@@ -179,13 +175,13 @@ def _line(contacts: ContactState, mesh: Mesh, elements: bool = False) -> tuple[F
     return line, MeshLine(line.xi[None, :], np.ascontiguousarray(line.segments.T), sort_t=False, validate=False)
 
 
-def _fields(
+def fields_of(
     line: FibrilLine,
     thermal: System,
     surface: Any,
     cooling: Cooling,
     probe: Probe,
-    flow: _Flow,
+    flow: Flow,
     load: Floats,
     temperature: Floats,
 ) -> Fields:
@@ -207,7 +203,7 @@ def _fields(
     )
 
 
-def _electric(line: FibrilLine, probe: Probe, flow: _Flow) -> dict[str, Any]:
+def _electric(line: FibrilLine, probe: Probe, flow: Flow) -> dict[str, Any]:
     """The values of a `Potential` by name."""
     return {
         "probe": probe.name,
@@ -218,137 +214,3 @@ def _electric(line: FibrilLine, probe: Probe, flow: _Flow) -> dict[str, Any]:
         "xi": line.xi,
         "potential": flow.potential,
     }
-
-
-def _electric_conductance(contacts: ContactState) -> Floats:
-    """(C,) conductance of each contact; none where one of its fibrils insulates."""
-    sigma = contacts.mesh.electrical_conductivity
-    conducts = (sigma[contacts.fibril_a] > 0.0) & (sigma[contacts.fibril_b] > 0.0)
-    return np.where(conducts, contacts.conductance, 0.0)
-
-
-@frozen
-class _Flow:
-    """Potential of one probe and the currents that follow from it."""
-
-    potential: Floats
-    """(K,) V, nan where undefined."""
-    unreached: Ints
-    """(U,) conducting fibrils without a potential."""
-    along: Floats
-    """(S,) current along +xi, A."""
-    terminal_currents: Floats
-    """(2,) into the textile at source and sink, A."""
-    fibril_heat: Floats
-    """(S,) Joule heat per length of axis sigma A V'^2, W/mm."""
-    contact_heat: Floats
-    """(C,) Joule heat of each contact, W."""
-
-
-def _flows(
-    contacts: ContactState, line: FibrilLine, axes: MeshLine, terminals: Sequence[Terminal], probes: Sequence[Probe]
-) -> list[_Flow]:
-    """Potential and currents of each probe."""
-    electric = build_system(Basis(axes, ElementLineP1()), line, line.conduction, _electric_conductance(contacts))
-    return [_flow(contacts, line, electric, terminals, probe) for probe in probes]
-
-
-def _flow(
-    contacts: ContactState, line: FibrilLine, system: System, terminals: Sequence[Terminal], probe: Probe
-) -> _Flow:
-    """Solve [38] for one probe on the fibrils that its terminals reach."""
-    mesh = contacts.mesh
-    if not probe.voltage:
-        allowed = "its voltage follows in each recorded state: solve Record.driven(design).probes, or probe.at(volts)"
-        raise DesignError(f"probes.{probe.name}.{probe.stated}", probe.drive, allowed)
-    source, sink = (_held(mesh, terminals, name) for name in (probe.source, probe.sink))
-    if np.any(source & sink):
-        fibril = int(np.argwhere(source & sink)[0, 1])
-        raise DesignError(f"probe {probe.name}", (probe.source, probe.sink), f"both hold an end of fibril {fibril}")
-    reached = _reached(contacts, np.flatnonzero(np.any(source | sink, axis=0)))
-    live = reached[line.fibril]
-    value = np.full(len(live), np.nan)
-    value[line.ends[source]], value[line.ends[sink]] = probe.voltage, 0.0
-    anchor = _anchor(contacts, line, np.any(source | sink, axis=0))
-    V = balance(system, np.zeros((1, len(live))), value, np.flatnonzero(live & np.isnan(value)), anchor)[0]
-    through, along, into = _currents(line, system, V, source | sink)
-    conduction = line.conduction
-    return _Flow(
-        potential=np.where(live, V, np.nan),
-        unreached=np.flatnonzero((mesh.electrical_conductivity > 0.0) & ~reached),
-        along=along,
-        terminal_currents=np.array([into[source].sum(), into[sink].sum()]),
-        fibril_heat=np.divide(along**2, conduction, out=np.zeros_like(along), where=conduction > 0.0),
-        contact_heat=through * (system.jump @ V),
-    )
-
-
-def _anchor(contacts: ContactState, line: FibrilLine, held: NDArray[np.bool_]) -> Ints | None:
-    """(K,) the first node of a fibril that hangs on contacts much weaker than its segments, else the node itself."""
-    n = len(held)
-    G = _electric_conductance(contacts)
-    hung = np.bincount(contacts.fibril_a, G, n) + np.bincount(contacts.fibril_b, G, n)
-    segment = np.zeros(n)
-    length = np.diff(line.xi[line.segments], axis=1)[:, 0]
-    np.maximum.at(segment, line.fibril[line.segments[:, 0]], line.conduction / length)
-    afloat = ~held & (hung < WEAK * segment)
-    if not afloat.any():
-        return None
-    anchor: Ints = np.where(afloat[line.fibril], line.ends[0][line.fibril], np.arange(len(line.fibril)))
-    return anchor
-
-
-def _held(mesh: FibrilMesh, terminals: Sequence[Terminal], name: str) -> NDArray[np.bool_]:
-    """(2, F) the conducting fibril ends, at xi = 0 and xi = L, that the named terminal joins."""
-    found = [t for t in terminals if t.name == name]
-    if len(found) != 1:
-        raise DesignError("terminal", name, f"known are {', '.join(sorted(t.name for t in terminals)) or 'none'}")
-    held = np.zeros((2, mesh.n_fibrils), dtype=np.bool_)
-    for yarn, side in found[0].ends:
-        if yarn not in mesh.yarn_names or side not in (-1, 1):
-            raise DesignError(f"terminal {name}", (yarn, side), f"must be one of {mesh.yarn_names} and -1 or +1")
-        held[(side + 1) // 2] |= mesh.yarn == mesh.yarn_names.index(yarn)
-    return held & (mesh.electrical_conductivity > 0.0)
-
-
-def _reached(contacts: ContactState, driven: Ints) -> NDArray[np.bool_]:
-    """(F,) conducting fibrils that hang together with a driven one."""
-    n = contacts.mesh.n_fibrils
-    touching = _electric_conductance(contacts) > 0.0
-    a, b = contacts.fibril_a[touching], contacts.fibril_b[touching]
-    _, cluster = connected_components(csr_matrix((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)
-    reached: NDArray[np.bool_] = np.isin(cluster, cluster[driven])
-    return reached
-
-
-def _currents(line: FibrilLine, system: System, V: Floats, held: NDArray[np.bool_]) -> tuple[Floats, Floats, Floats]:
-    """Currents through the contacts (C,), along the elements (S,), and into both fibril ends (2, F).
-
-    The difference of V over a short element loses the digits that its large conductance multiplies. So the
-    current at xi = 0 is what the contacts drain in all where xi = L is not `held` (2, F), nothing where it is not held
-    itself, and else follows from the whole fibril, V0 - VL = sum R_s i_s; all others are that less what the contacts
-    drain on the way (Kirchhoff): the same numbers without that loss.
-    """
-    through = system.conductance * (system.jump @ V)
-    leaving = system.jump.T @ through
-    (first, last), left = line.ends, line.segments[:, 0]
-    owner = line.fibril[left]
-    length = np.diff(line.xi[line.segments], axis=1)[:, 0]
-    conducting = line.conduction > 0.0
-    R = np.divide(length, line.conduction, out=np.zeros_like(length), where=conducting)
-    total = np.cumsum(leaving)
-    before = total[first] - leaving[first]
-    drained = total[left] - before[owner]
-    R_fibril, lost = (np.bincount(owner, w, len(first)) for w in (R, R * drained))
-    through_all = np.divide(V[first] - V[last] + lost, R_fibril, out=np.zeros_like(lost), where=R_fibril > 0.0)
-    entering = np.where(held.all(axis=0), through_all, np.where(held[0], total[last] - before, 0.0))
-    along = np.where(conducting, entering[owner] - drained, 0.0)
-    return through, along, np.where(held, np.stack([entering, total[last] - before - entering]), 0.0)
-
-
-def _joule_heat(thermal: System, flow: _Flow, contact_heat: bool) -> Floats:
-    """Right-hand side of [37]: heat of the fibrils and, half to each side, of the contacts."""
-    load = constant_source(thermal.basis, flow.fibril_heat)
-    if contact_heat:
-        load = load + 0.5 * (thermal.foot[0] + thermal.foot[1]).T @ flow.contact_heat
-    return load

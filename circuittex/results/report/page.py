@@ -14,6 +14,7 @@ from markupsafe import Markup
 from circuittex.base.arrays import Floats
 from circuittex.base.atomic import write_text
 from circuittex.design import Design
+from circuittex.design.statement import LINEAR
 from circuittex.results.claims.table import Table, claims_table
 from circuittex.results.clamps import clamp_statement
 from circuittex.results.effort import effort
@@ -147,6 +148,7 @@ def _states(study: Study) -> Markup:
         heat=_heat(study),
         ratings=_ratings(study),
         rise=_number(study.design.electrical.rated_rise),
+        linear=study.design.electrical.heating == LINEAR,
         effort=(*effort(study), *clamp_statement(study)),
         energy=energy_section(study),
     )

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from circuittex.design import Design, Probe
+from circuittex.design.statement import NONLINEAR
 from circuittex.electrical.network.circuit import Circuit, yarn_end_name
 from circuittex.netlist import Header, deck
+from circuittex.study.export import COLD
 from circuittex.study.library.cell import Cell
 from circuittex.study.library.dialect import DIALECTS
 from circuittex.study.library.instance import instance
@@ -94,4 +96,5 @@ def crimped_probe(design: Design, circuit: Circuit, probe: Probe, state: str) ->
     ends = {terminal.name: [yarn_end_name(yarn, side) for yarn, side in terminal.ends] for terminal in design.terminals}
     drive = dict.fromkeys(ends[probe.source], probe.voltage) | dict.fromkeys(ends[probe.sink], 0.0)
     title = f"detailed resistor network, probe {probe.name}, the fibrils of every yarn end joined"
-    return deck(circuit, drive, Header(title, design.name, state=state))
+    notes = (COLD,) if design.electrical.heating == NONLINEAR else ()
+    return deck(circuit, drive, Header(title, design.name, state=state, notes=notes))

@@ -13,10 +13,10 @@ import numpy as np
 from circuittex.base.atomic import write_text
 from circuittex.base.errors import CircuittexWarning, DesignError
 from circuittex.base.version import __version__
+from circuittex.design.statement import NONLINEAR
 from circuittex.electrical.network.names import safe_name
 from circuittex.results.records import Study
-from circuittex.study.circuits import state_circuits
-from circuittex.study.export import probe_netlist, simplified
+from circuittex.study.export import circuits_of, probe_netlist
 from circuittex.study.library.accuracy import Errors
 from circuittex.study.library.cell import DIALECTS, Cell
 from circuittex.study.library.datasheet import write_datasheet
@@ -120,6 +120,12 @@ def _checked(study: Study, state: str, ends: str, thin: float, dialects: Sequenc
         raise DesignError("thin", thin, "it must be an error from 0 to less than 1, such as 0.001")
     if not (0.0 < rise < np.inf):
         raise DesignError("rise", rise, "it must be > 0 K")
+    electrical = study.design.electrical
+    if electrical.heating == NONLINEAR and rise != electrical.rated_rise:
+        allowed = (
+            f"heating is nonlinear: currents are rated for electrical.rated_rise alone, {electrical.rated_rise:g} K"
+        )
+        raise DesignError("rise", rise, allowed)
     if unknown := [each for each in dialects if each not in DIALECTS]:
         raise DesignError("dialects", unknown[0], f"it must be one of {', '.join(DIALECTS)}")
     names = [record.name for record in study.records]
@@ -199,7 +205,7 @@ def _write_probes(folder: Path, study: Study, chosen: int) -> None:
     record, design = study.records[chosen], study.design
     if not design.probes:
         return
-    circuits = state_circuits(simplified(design, record.contacts), design.terminals, design.probes)
+    circuits = circuits_of(design, record.contacts, record.fields)
     for probe in record.driven(design).probes:
         word = safe_name(probe.name)
         _write_ascii(folder / f"probe_{word}_free.cir", probe_netlist(design, record.name, circuits, probe))

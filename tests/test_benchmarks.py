@@ -254,13 +254,19 @@ def test_every_section_of_the_page_is_a_benchmark_with_results() -> None:
 
 def test_size_measures_both_ways_and_compares_sizes() -> None:
     size = script("size")
-    found = [size.measured(way, 1, 3, 4) for way in size.WAYS]
+    found = [size.measured(way, 1, 3, 4) for way in size.WAYS[:2]]
     assert [result["cheap"] > 0 for result in found] == [False, True]
+    assert size.measured("tiled", 4, 3, 2)["way"] == "tiled"
     table = size.table(
         [found[1], {**found[1], "unknowns": 2 * found[1]["unknowns"], "seconds": 2 * found[1]["seconds"]}]
     )
     assert len(table.rows[0]) == len(size.HEAD)
     assert table.rows[1][-2] == pytest.approx(1.0)
+    several = [{**found[0], "yarns": 2, "filaments": n, "unknowns": 100 * n} for n in (10, 34, 100)]
+    assert [len(axes.lines) for axes in size.growth(several).axes] == [2, 2]
+    slender = size.cell(1, 34, 5)
+    assert slender.weave.warp[0].n_fibrils == 34
+    assert 34 * slender.weave.warp[0].radius ** 2 == pytest.approx(10 * 0.15**2)
 
 
 def test_starts_measures_each(monkeypatch: pytest.MonkeyPatch) -> None:

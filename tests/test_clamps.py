@@ -25,6 +25,7 @@ from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.mech.motions import Motions
 from circuittex.relaxation.increment import advance
 from circuittex.relaxation.relax import Equilibrium, relax
+from circuittex.relaxation.starts import tiled
 from circuittex.results.clamps import extensions, tensions
 from circuittex.results.store import load_study, write_study_start
 from circuittex.results.summary import table, write_summary
@@ -255,6 +256,16 @@ def test_a_fabric_set_in_its_weave_stays_as_it_is_off_the_loom() -> None:
     found = relax(mesh, design)
     assert found.iterations == 0
     assert same(found.configuration, initial_configuration(mesh))
+
+
+def test_a_start_from_copies_of_a_cell_has_its_clamps_where_they_were_laid_out() -> None:
+    """Copies meet where they are held; from there the clamps of the whole slide."""
+    design, mesh = small_cell((1,), yarns=4, elements=12, tolerance=f"{TIGHT} N")
+    design = under(design, 0.03, 0.0)
+    start = tiled(mesh, design)
+    assert np.array_equal(start.r[mesh.ends], mesh.position[mesh.ends])
+    found = relax(mesh, design, start)
+    assert np.abs(tensions(mesh, found.reaction) - np.repeat([0.03, 0.0], 4)).max() <= TIGHT
 
 
 # ---- with loadings ----------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ import numpy as np
 
 from circuittex.base.arrays import Ints
 from circuittex.base.errors import ConvergenceError, DesignError, PenetrationError
-from circuittex.design import Design, Weave
+from circuittex.design import Clamps, Design, Weave
 from circuittex.design.statement import AUTO
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
@@ -47,6 +47,8 @@ def repeat(weave: Weave) -> tuple[int, int]:
 def repeated_cell(design: Design) -> Design:
     """The smallest cell of which whole copies make the weave of a design, with elements as long as there or shorter.
 
+    Its clamps are held, or copies would not meet.
+
     Raises `DesignError` where there is none: the draft does not repeat, or the packing is random.
 
     >>> from circuittex.design import plain_weave
@@ -77,6 +79,7 @@ def repeated_cell(design: Design) -> Design:
         loading=(),
         terminals=(),
         probes=(),
+        clamps=Clamps(),
     )
 
 

@@ -264,6 +264,9 @@ def test_a_design_that_is_far_too_large_is_refused_before_anything_is_done(
         assert word in str(refused.value)
     assert (files(tmp_path), len(canned.reached)) == (before, done)
     run_study(STUDY.design, tmp_path, workers=1)  # nothing to compute, and so nothing that is too large
+    with pytest.raises(SizeError):
+        run_study(STUDY.design, tmp_path / "new", workers=1)
+    assert files(tmp_path / "new") == set(), "nor is a study begun, for which a start may have to be computed"
 
 
 def test_a_factor_that_is_too_large_is_never_made(

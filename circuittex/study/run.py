@@ -22,6 +22,7 @@ from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.results.records import INITIAL, Examination, Study, with_examination
+from circuittex.results.store import RESULTS
 from circuittex.study.branch_check import branch_checks
 from circuittex.study.error_estimate import estimates, variants
 from circuittex.study.folder import (
@@ -116,7 +117,8 @@ def run_study(
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     with locked(folder):
-        foreseen = foresee(study, count) if fresh else None  # what is too large removes nothing
+        # What is too large removes nothing, and no start is computed for it.
+        foreseen = foresee(study, count) if fresh or not (folder / RESULTS).exists() else None
         study = open_study(folder, study, begin, fresh=fresh)
         return _in_folder(folder, study, count, solver, say, jobs, foreseen)
 

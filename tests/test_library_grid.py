@@ -401,3 +401,18 @@ def test_the_cell_has_corners_beside_both_strains(packings: Path) -> None:
 def test_the_datasheet_draws_the_grid(library: Path) -> None:
     assert "under two strains at once" in (library.parent / "datasheet.html").read_text("utf-8")
     assert (library.parent / "figures" / "grid.png").stat().st_size > 10_000
+
+
+def test_a_loading_called_as_a_grid_is_refused(tmp_path: Path) -> None:
+    """Of two files of one name there was the last."""
+    made = with_both(study(3))
+    first, *others = made.design.loading
+    other = "stretch_x_shear"
+    design = replace(made.design, loading=(replace(first, name=other), *others))
+    records = tuple(
+        replace(r, loading=other, name=r.name.replace(first.name, other)) if r.loading == first.name else r
+        for r in made.records
+    )
+    with pytest.raises(DesignError, match=f"loading: 'fabric_ports_{other}_s' is not usable; two sub-circuits"):
+        export_library(replace(made, design=design, records=records), tmp_path)
+    assert not list(tmp_path.iterdir())

@@ -13,6 +13,7 @@ import pytest
 from gnucap import needs_gnucap
 from library_cases import pins_of, study
 from numpy.typing import NDArray
+from scipy.integrate import quad
 from scipy.linalg import eigvalsh
 
 from circuittex.base.errors import DesignError
@@ -124,8 +125,18 @@ def test_a_bundle_of_two_wires_has_the_radius_of_their_mean_distance() -> None:
     R, d, long = 0.15, 0.3, 8.0
     mesh = build_mesh(plain_weave(yarns=4, rows=(2,)))
     flat = replace(mesh, position=mesh.position * [1.0, 1.0, 0.0])
-    expected = MU0 * long / (2 * np.pi) * (np.log(2 * long / np.sqrt(0.7788007830714049 * R * d)) - 1)
-    np.testing.assert_allclose(inductance(yarn_lines(flat, flat.position)), expected, rtol=1e-9)
+    g = np.sqrt(0.7788007830714049 * R * d)
+    expected = MU0 * long / (2 * np.pi) * (np.log(2 * long / g) - 1)
+    np.testing.assert_allclose(inductance(yarn_lines(flat, flat.position)), expected, rtol=g / long)  # a long wire's
+
+
+@pytest.mark.parametrize("g", [0.01, 0.5, 3.0])
+def test_an_inductance_is_that_of_two_filaments_and_never_negative(g: float) -> None:
+    """Neumann's integral over both, of 1 mm a distance g apart; a wide yarn of a narrow cell had less than none."""
+    along = quad(lambda u: 2 * (1 - u) / np.hypot(u, g), 0, 1, epsabs=1e-13)[0]
+    known = YarnLines(np.array([[[0.0, 0, 0], [1.0, 0, 0]]]), np.array([g]), np.array([g]))
+    assert inductance(known)[0] == pytest.approx(MU0 / (4 * np.pi) * along, rel=1e-9)
+    assert inductance(known)[0] > 0.0
 
 
 def test_the_outline_is_that_of_the_fibrils() -> None:

@@ -71,18 +71,20 @@ def _bundle(lines: Floats, R: Floats) -> tuple[Floats, float, float]:
 
 
 def inductance(lines: YarnLines) -> Floats:
-    """(Y,) partial inductance of each yarn, H: mu0 l / (2 pi) (ln(2 l / g) - 1).
+    """(Y,) partial inductance of each yarn, H: mu0 / (2 pi) (l arsinh(l / g) - sqrt(l^2 + g^2) + g).
 
     l is the length of its centre line and g the geometric mean distance of its conductors from themselves (Rosa, The
-    self and mutual inductances of linear conductors, Bulletin of the Bureau of Standards 4, 1908); for one round wire
-    that is ln(2 l / R) - 3/4. The current comes back far away.
+    self and mutual inductances of linear conductors, Bulletin of the Bureau of Standards 4, 1908). Where l is much
+    longer than g that is mu0 l / (2 pi) (ln(2 l / g) - 1), of one round wire ln(2 l / R) - 3/4, which would be negative
+    for yarns wider than they are long. The current comes back far away.
 
-    >>> straight = YarnLines(np.array([[[0.0, 0, 0], [100.0, 0, 0]]]), np.array([1.0]), np.exp([-0.25]))
-    >>> bool(np.isclose(inductance(straight)[0], 2e-10 * 100.0 * (np.log(200.0) - 0.75), rtol=1e-9))
+    >>> straight = YarnLines(np.array([[[0.0, 0, 0], [1e4, 0, 0]]]), np.array([1.0]), np.exp([-0.25]))
+    >>> bool(np.isclose(inductance(straight)[0], 2e-10 * 1e4 * (np.log(2e4) - 0.75), rtol=1e-5))
     True
     """
     length = np.linalg.norm(np.diff(lines.place, axis=1), axis=-1).sum(axis=1)
-    return np.asarray(MU0 * length / (2 * np.pi) * (np.log(2 * length / lines.mean_distance) - 1.0))
+    g = lines.mean_distance
+    return np.asarray(MU0 / (2 * np.pi) * (length * np.arcsinh(length / g) - np.hypot(length, g) + g))
 
 
 def end_capacitances(lines: YarnLines, permittivity: float) -> Floats:

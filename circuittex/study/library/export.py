@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -74,6 +75,7 @@ def export_library(
     known = facts_of(study, ends, thin, rise, members, combine)
     word = safe_name(name) + ("_free" if ends == FREE else "")
     found = list(_parts(study, known, word, chosen, ends))
+    _check_names(found)
     if differs(study.design, "tc1", "tc2"):
         found = _with_temperature(study, known, word, chosen, ends, found)
     folder = Path(folder)
@@ -104,6 +106,14 @@ def export_library(
         library["tolerance"] = dict(zip(("fall", "rise"), known.tolerance, strict=True))
     write_text(folder / "library.json", json.dumps(library, indent=1) + "\n", encoding="ascii")
     return tuple(cells)
+
+
+def _check_names(parts: Sequence[Part]) -> None:
+    """Refuse parts of one name, of which one file would be that of the last: words of paths and grids are joined to
+    those of levels."""
+    twice = [name for name, count in Counter(part.name.lower() for part in parts).items() if count > 1]
+    if twice:
+        raise DesignError("loading", twice[0], "two sub-circuits would have this name: give the loading another one")
 
 
 def _plain(errors: Errors) -> dict[str, list[float | None]]:

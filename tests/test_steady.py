@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
-from synthetic import rails, woven
+from synthetic import fibrils, rails, touching, woven
 
 from circuittex.base.arrays import Floats
 from circuittex.base.errors import DesignError
@@ -380,8 +380,19 @@ def test_the_rated_current_of_a_fibril_of_one_temperature(tc1: float) -> None:
     assert np.isnan(solve_steady(state, idle, nothing, following(state, tc1), cooling=cooling, rise=T).rated[1:]).all()
 
 
+def test_a_rating_is_of_the_hottest_point_inside_an_element() -> None:
+    """Which a cool neighbour moves off the middle: what a current does beside the one it is rated for says the same."""
+    mesh = fibrils([LENGTH, LENGTH], elements=3, sigma=1.0 / (OHM * np.pi * RADIUS**2))
+    state = touching(mesh, 0, 2.9, 1, 2.9, conductance=0.0, heat_conductance=0.05)
+    given = following(state, 0.004)
+    faint = solve_steady(state, ENDS, along(voltage=1e-3), given, cooling=COLD_ENDS, rise=50.0)
+    found = solve_steady(state, ENDS, along(current=faint.rated[1]), given, cooling=COLD_ENDS)
+    assert found.peak_temperature == pytest.approx(50.0, rel=1e-8)  # sought to 1e-9
+    assert found.temperature.max() < 0.999 * found.peak_temperature
+
+
 def test_the_rated_current_makes_the_rated_rise(cell: ContactState) -> None:
-    """The hottest point, wherever it comes to lie, and inside an element or not."""
+    """With contacts, and whatever drives what is rated."""
     given = following(cell, 0.004, 1e-6, -0.001)
     for end in (None, 3e-3):
         cooling = surfaces(cell, 1e-4, RADIATES, end)

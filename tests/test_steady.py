@@ -10,24 +10,27 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
-from synthetic import rails, woven
+from synthetic import fibrils, rails, touching, woven
 
 from circuittex.base.arrays import Floats
 from circuittex.base.errors import DesignError
 from circuittex.contact.state import ContactState
-from circuittex.design import Probe, Terminal
+from circuittex.design import Probe, Terminal, plain_weave
 from circuittex.electrical.fields import (
     COLD_ENDS,
     Coefficients,
     Cooling,
     Fields,
     at_temperatures,
+    coefficients_of,
     solve_potentials,
     solve_probes,
     solve_steady,
     steady,
 )
 from circuittex.electrical.fields.cooling import STEFAN_BOLTZMANN
+from circuittex.geometry.weave import build_mesh
+from circuittex.study.library.resistivity import scaled, warmer
 
 LENGTH, RADIUS, OHM, K = 8.0, 0.15, 0.5, 1.0
 """mm, mm, ohm/mm and W/(mm K) of the made-up fibrils."""
@@ -101,6 +104,42 @@ def test_a_fibril_of_one_temperature(stated: str, tc1: float, tc2: float) -> Non
     assert found.heat_out == 0.0
     if stated == "current":
         assert found.currents[0] == pytest.approx(drive, rel=ROUNDING)
+
+
+def test_a_coated_fibril_of_one_temperature() -> None:
+    """Core and shell side by side, of which the shell carries a third when cold: each resists as it is warm."""
+    state, (tc1, tc2), (shell1, shell2), w, volts = straight(), (0.005, 0.0), (-0.003, 4e-6), 1 / 3, DRIVES["voltage"]
+
+    def resistance(T: float) -> float:
+        return WHOLE / ((1 - w) / (1 + tc1 * T + tc2 * T**2) + w / (1 + shell1 * T + shell2 * T**2))
+
+    T = brentq(lambda T: leaves(T) - volts**2 / resistance(T), 0.0, 400.0, xtol=1e-12, rtol=1e-14)
+    n = state.mesh.n_fibrils
+    given = replace(
+        following(state, tc1, tc2), shell=np.tile([shell1, shell2], (n, 1)), in_shell=np.full(n, w, dtype=np.float64)
+    )
+    found = solve_steady(state, ENDS, along(voltage=volts), given, cooling=surfaces(state, H, RADIATES))
+    np.testing.assert_allclose(found.temperature[found.fibril == 0], T, rtol=ROUNDING)
+    assert volts / found.currents[0] == pytest.approx(resistance(T), rel=ROUNDING)
+
+
+def test_fibrils_follow_the_coefficients_of_exported_parts() -> None:
+    """Of bare and of coated yarns, as a library has them at 50 K."""
+    design = plain_weave(yarns=2, rows=(1,))
+    bare = design.weave.warp[0]
+    core, shell = (
+        replace(bare.materials[0], name=name, tc1=tc1, tc2=tc2, electrical_conductivity=sigma)
+        for name, tc1, tc2, sigma in (("core", 0.006, 1e-6, 5.0), ("shell", 0.001, 3e-6, 20.0))
+    )
+    plated = replace(bare, name="plated", materials=(core,), shell=shell, shell_thickness=0.2 * bare.radius)
+    design = replace(design, weave=replace(design.weave, warp=(plated, plated)))
+    mesh, none = build_mesh(design), np.zeros(0)
+    state = ContactState(mesh, none.astype(int), none.astype(int), *[none] * 8, np.ones(len(mesh.elements)))
+    f, _ = coefficients_of(design, state).resistivity(np.arange(4), np.full((4, 1), 50.0))
+    warm = scaled(design, state, warmer(50.0)).mesh.electrical_conductivity
+    np.testing.assert_allclose(f[:, 0], mesh.electrical_conductivity / warm, rtol=1e-14)
+    assert abs(f[0, 0] - 1.0) > 0.01
+    assert f[2, 0] == 1.0
 
 
 def by_scipy(volts: float, tc1: float, tc2: float, h: float, radiates: float) -> Any:
@@ -235,11 +274,14 @@ def test_newton_converges_at_second_order(cell: ContactState, monkeypatch: pytes
         return found
 
     monkeypatch.setattr(steady, "_correction", spied)
+    n = cell.mesh.n_fibrils
     for stated, drive in HOT.items():
         sizes.clear()
         probe = Probe("across", "left", "top", **{stated: drive})
         cooling = surfaces(cell, 1e-4, RADIATES, 3e-3)
-        solve_steady(cell, TOUCHING, probe, following(cell, 0.004, 1e-6, -0.001), cooling=cooling, area=1.0)
+        plated = {"shell": np.tile([-0.002, 2e-6], (n, 1)), "in_shell": np.full(n, 0.3)}
+        given = replace(following(cell, 0.004, 1e-6, -0.001), **plated)
+        solve_steady(cell, TOUCHING, probe, given, cooling=cooling, area=1.0)
         first, second, third = sizes[:3]
         assert second < 0.3 * first
         assert third < 3 * second * (second / first) ** 2  # at first order: second * (second / first)
@@ -338,8 +380,19 @@ def test_the_rated_current_of_a_fibril_of_one_temperature(tc1: float) -> None:
     assert np.isnan(solve_steady(state, idle, nothing, following(state, tc1), cooling=cooling, rise=T).rated[1:]).all()
 
 
+def test_a_rating_is_of_the_hottest_point_inside_an_element() -> None:
+    """Which a cool neighbour moves off the middle: what a current does beside the one it is rated for says the same."""
+    mesh = fibrils([LENGTH, LENGTH], elements=3, sigma=1.0 / (OHM * np.pi * RADIUS**2))
+    state = touching(mesh, 0, 2.9, 1, 2.9, conductance=0.0, heat_conductance=0.05)
+    given = following(state, 0.004)
+    faint = solve_steady(state, ENDS, along(voltage=1e-3), given, cooling=COLD_ENDS, rise=50.0)
+    found = solve_steady(state, ENDS, along(current=faint.rated[1]), given, cooling=COLD_ENDS)
+    assert found.peak_temperature == pytest.approx(50.0, rel=1e-8)  # sought to 1e-9
+    assert found.temperature.max() < 0.999 * found.peak_temperature
+
+
 def test_the_rated_current_makes_the_rated_rise(cell: ContactState) -> None:
-    """The hottest point, wherever it comes to lie, and inside an element or not."""
+    """With contacts, and whatever drives what is rated."""
     given = following(cell, 0.004, 1e-6, -0.001)
     for end in (None, 3e-3):
         cooling = surfaces(cell, 1e-4, RADIATES, end)

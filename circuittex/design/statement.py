@@ -407,7 +407,8 @@ class Design:
                     raise refuse("contact.pairs.materials", material, allowed)
 
     def _check_heating(self) -> None:
-        electrical, fibrils = self.electrical, [each for yarn in self.weave.yarns for each in yarn.fibrils]
+        electrical, yarns = self.electrical, self.weave.yarns
+        fibrils = [each for yarn in yarns for each in (*yarn.materials, *yarn.surfaces)]
         follows = any(each.tc1 or each.tc2 for each in fibrils) or any(
             each.tc1 or each.tc2 for each in (self.contact, *self.contact.pairs)
         )

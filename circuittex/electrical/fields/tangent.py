@@ -58,13 +58,13 @@ class Resistors:
     """M."""
 
     def factors(self, T: Floats) -> tuple[Floats, Any]:
-        """(M + C,) mean of 1 + tc1 T + tc2 T^2 over each element, its value at each contact, whose temperature is the
-        mean of the two it joins; and (M + C, N) how they change with T."""
+        """(M + C,) mean of f(T) over each element, its value at each contact, whose temperature is the mean of the two
+        it joins; and (M + C, N) how they change with T."""
         line, basis, M = self.line, self.thermal.basis, self.elements
-        tc1, tc2 = self.coefficients.fibril[line.fibril[line.segments[:, 0]]].T[:, :, None]
-        rise = np.asarray(basis.interpolate(T))
-        along = np.bincount(line.element, (self.share * (1.0 + rise * (tc1 + tc2 * rise))).sum(axis=1), M)
-        slope = self.share * (tc1 + 2.0 * tc2 * rise)
+        owner, rise = line.fibril[line.segments[:, 0]], np.asarray(basis.interpolate(T))
+        f, slope = self.coefficients.resistivity(owner, rise)
+        along = np.bincount(line.element, (self.share * f).sum(axis=1), M)
+        slope = self.share * slope
         shapes = [np.asarray(shape) for (shape,) in basis.basis]
         values = [np.sum(slope * shape, axis=1) for shape in shapes]
         dofs = basis.element_dofs

@@ -170,6 +170,16 @@ def test_a_state_of_a_similar_design_leads_to_the_same_equilibrium(
     assert found.energy != pytest.approx(source.energy, rel=100 * SAME)
 
 
+def test_a_state_moves_the_nodes_of_another_weave_as_its_own(small: tuple[Design, FibrilMesh, Equilibrium]) -> None:
+    design, mesh, source = small
+    higher = replace(design, weave=replace(design.weave, amplitude=0.21))
+    there = build_mesh(higher)
+    start = from_state(there, higher, source.configuration, mesh)
+    moved, own = (of.r - initial_configuration(on).r for of, on in ((start, there), (source.configuration, mesh)))
+    np.testing.assert_allclose(moved, own, rtol=0, atol=1e-14)
+    assert np.array_equal(start.r[there.ends], there.position[there.ends])
+
+
 def test_what_has_no_smaller_cell_is_refused() -> None:
     design, mesh = small_cell((1,), yarns=2)
     with pytest.raises(DesignError, match=r"start: 'tiled' is not usable; the draft of 2 x 2 yarns is no whole number"):

@@ -5,7 +5,7 @@
 Each cell of N x N yarns is relaxed from the initial weave in processes of its own, so that its peak memory is its own.
 Seconds are the processor's, of all threads: other work on the machine changes them little. "With" has the descent
 whatever the size, "without" never; `relax` chooses by `WORTH_A_DESCENT`. "Tiled" starts from copies of the relaxed
-smallest cell, whose seconds count. Yarns of other than 3, 10 or 19 filaments have the section of those of 10, in a
+smallest cell, whose seconds count. Yarns of other than 3 or 10 filaments have the section of those of 10, in a
 round outline, and Hertz's penalty. The exponents compare a row with the one before it of the same kind, against the
 unknowns. With --keep the results are added to those in a file, of which --figure draws all. Takes minutes, with 16 x 16
 yarns or 100 filaments more.
@@ -43,7 +43,7 @@ from circuittex.results.plot.style import COLOURS, new_figure, style
 
 Result = dict[str, Any]
 WAYS = ("without", "with", "tiled")
-ROWS = {3: (1, 2), 10: (3, 4, 3), 19: (3, 4, 5, 4, 3)}
+ROWS = {3: (1, 2), 10: (3, 4, 3)}
 """Rows of yarns of so many filaments as thick as the paper's."""
 HEAD = ["descent", "yarns", "filaments", "unknowns", "iterations by gradients", "of Newton", "factorisations"]
 HEAD += ["contact searches", "processor s", "energy N mm", "residual N", "peak MB", "exponent of s", "of memory"]

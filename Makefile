@@ -9,7 +9,7 @@ PYTEST_ARGS ?= -n auto --dist loadgroup
 PY := $(VENV)/bin/python
 export VENV PYTHON
 
-.PHONY: run paper test test-oldest lint style types docs clean ngspice gnucap help
+.PHONY: run paper test test-oldest lint style types validation docs clean ngspice gnucap help
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -41,6 +41,9 @@ style: $(VENV)/.ready
 types: $(VENV)/.ready
 	$(PY) -m mypy
 
+validation: $(VENV)/.ready ngspice ## hold the program against published measurements: docs/validation.md (minutes)
+	$(PY) validation/write.py
+
 docs: $(VENV)/.ready-docs ngspice ## build the documentation into docs/_build, warnings are errors
 	$(PY) -m sphinx -W --keep-going -E -q $(SPHINXOPTS) -b html docs docs/_build
 	@echo "documentation: docs/_build/index.html"
@@ -53,7 +56,7 @@ gnucap: ## install gnucap where it is missing: a second simulator for the tests
 
 clean: ## remove the environment, caches and built documentation, but no results
 	rm -rf $(VENV) build dist *.egg-info docs/_build .pytest_cache .mypy_cache .ruff_cache .hypothesis
-	find circuittex tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+	find circuittex tests benchmarks validation -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The stamps make repeated calls quick: the environment is renewed when the dependencies or its recipe change.
 $(VENV)/.ready: pyproject.toml .ci/setup

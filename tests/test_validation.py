@@ -1,0 +1,73 @@
+"""The comparisons with measurements: the page is what they say, and what they start from has a source or a reason."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+FOLDER = Path(__file__).parents[1] / "validation"
+PAGE = (FOLDER.parent / "docs" / "validation.md").read_text(encoding="utf-8")
+OTHER_MACHINES = 0.005
+"""Relative: three digits are printed, and no relaxation is behind those that are computed here."""
+
+
+@pytest.fixture
+def script(monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.syspath_prepend(str(FOLDER))
+    return importlib.import_module
+
+
+def numbers(text: str) -> list[float]:
+    return [float(number) for number in re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]\d+)?(?![\w.])", text)]
+
+
+def test_the_page_has_what_is_computed(script: Any) -> None:
+    """Those that take no relaxation, all of them again; words are the same, and numbers within what is printed."""
+    found = [script("wires").compare(), *script("rods").compare()]
+    for comparison in found:
+        mine = comparison.text().strip()
+        start = PAGE.index(f"## {comparison.title}\n")
+        theirs = PAGE[start : start + len(mine) + 20].split("\n## ")[0].strip()
+        assert numbers(mine) == pytest.approx(numbers(theirs), rel=OTHER_MACHINES)
+        assert re.sub(r"[\d.e+-]+", "", mine) == re.sub(r"[\d.e+-]+", "", theirs)
+
+
+def test_misses_are_counted() -> None:
+    agree, missed = PAGE.count("| agrees |"), PAGE.count("**missed** by")
+    assert f"**{agree} of {agree + missed} numbers agree, {missed} are missed.**" in PAGE
+    assert missed > 0
+
+
+def test_bands_that_meet_agree(script: Any) -> None:
+    comparison: ModuleType = script("comparison")
+    band, point = comparison.Band, comparison.Point
+    assert point("", band(1.0, 2.0), band(2.0, 3.0)).factor == 1.0
+    assert point("", band(1.0, 2.0), band(4.0, 5.0)).factor == 2.0
+    assert point("", band(2.0, 3.0), band(0.5, 1.0)).factor == 0.5
+
+
+def test_an_input_without_a_source_needs_a_reason(script: Any) -> None:
+    comparison: ModuleType = script("comparison")
+    known, other = (comparison.Source(name, "A page") for name in ("one", "other"))
+    made = dict.fromkeys(("title", "measured", "computed", "unit", "meaning"), "")
+    for given in (comparison.Input("E", "1", None), comparison.Input("E", "1", other)):
+        with pytest.raises(ValueError, match="source"):
+            comparison.Comparison(**made, sources=(known,), inputs=(given,), points=())
+
+
+def test_heat_to_the_air_is_as_textbooks_tabulate(script: Any) -> None:
+    """Morgan's (1975) table in three decades; the two correlations differ by up to a fifth, as their authors say."""
+    air: ModuleType = script("air")
+    for decade, expected in ((1e-4, 0.675 * 1e-4**0.058), (1.0, 1.02), (90.0, 1.02 * 90.0**0.148)):
+        k, _, Ra = air._air(1.0, 400.0, 300.0)
+        diameter = (decade / Ra) ** (1 / 3)
+        assert air.morgan(diameter, 400.0, 300.0) * diameter / k == pytest.approx(expected, rel=1e-9)
+        assert air.churchill_chu(diameter, 400.0, 300.0) * diameter / k == pytest.approx(expected, rel=0.2), (
+            "of each other"
+        )
+    assert air.radiation(1.0, 301.0, 300.0) == pytest.approx(4 * 5.67e-8 * 300.5**3, rel=1e-3)

@@ -1,0 +1,106 @@
+"""Crossed metals under a stated force: constriction without films."""
+
+# ruff: noqa: E501 (sentences of the page)
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+from comparison import Band, Comparison, Input, Point, Source
+
+from circuittex.contact.conductance import Touches, holm
+from circuittex.contact.constriction import spot_of_ellipse
+from circuittex.contact.ellipse import hertz_ellipse
+from circuittex.contact.law import effective_modulus
+
+TRINGE = Source(
+    "Tringe",
+    "J. W. Tringe, W. D. Wilson, J. E. Houston, SPIE (2001), ADA437511: 'about 100 mOhm with a 100 uN force', gold on gold",
+    "https://www.scribd.com/document/682207390/ADA437511-gold-relay-contact-study-mili-aero",
+)
+HANDBOOK = Source(
+    "switchgear handbooks",
+    "R = K / (0.102 F/N)^m microohm, clean point contacts: K = 60 for silver, 80 to 140 for copper, m = 1/2 (from memory, not read again)",
+)
+CRC = Source(
+    "CRC",
+    "CRC Handbook of Chemistry and Physics: resistivities at 20 C",
+    "https://www.coursehero.com/file/6669542/15-12-86/",
+)
+METALS = {"silver": (1.587e-5, 83e3, 0.37), "copper": (1.678e-5, 128e3, 0.34), "gold": (2.2e-5, 78e3, 0.44)}
+"""ohm mm, MPa, nu."""
+
+
+def resistance(metal: str, force: float, radius: float) -> float:
+    """ohm, of two equal rods (mm) that cross at a right angle under a force (N), by the law `holm`."""
+    rho, E, nu = METALS[metal]
+    one = np.ones(1)
+    modulus = effective_modulus(E * one, nu * one, E * one, nu * one)
+    ellipse = hertz_ellipse(force * one, one, radius * one, radius * one, modulus)
+    touches = Touches(
+        force=force * one,
+        sine=one,
+        length=2 * ellipse.long,
+        area=ellipse.area,
+        spot=spot_of_ellipse(ellipse),
+        radius_a=radius * one,
+        radius_b=radius * one,
+        modulus=modulus,
+        bulk_a=one / rho,
+        bulk_b=one / rho,
+        film=one,
+        reference_conductance=one,
+        reference_force=one,
+        exponent=one,
+    )
+    return float(1 / holm(touches)[0])
+
+
+def compare() -> tuple[Comparison, Comparison]:
+    forces, elastic = (0.1, 1.0, 10.0), []
+    for metal, low, high in (("silver", 60.0, 60.0), ("copper", 80.0, 140.0)):
+        for force in forces:
+            over = 1e-6 / sqrt(0.102 * force)
+            found = [1e6 * resistance(metal, force, radius) for radius in (0.75, 1.5)]
+            point = Point(
+                f"{metal}, {force:g} N", Band(1e6 * low * over, 1e6 * high * over), Band(min(found), max(found))
+            )
+            elastic.append(point)
+    spot, metal = [1e3 * resistance("gold", 1e-4, radius) for radius in (0.004, 0.008)], "gold"
+    inputs = (
+        Input("resistivities", "15.87 and 16.78 nohm m", CRC),
+        Input("moduli and Poisson ratios", "83 GPa, 0.37 (silver); 128 GPa, 0.34 (copper)", None, "handbooks"),
+        Input("radius of the rods", "0.75 to 1.5 mm", None, "as such tests are done; it enters by its cube root"),
+    )
+    return (
+        Comparison(
+            title="Crossed rods of silver and of copper",
+            measured="What switchgear is designed by, for clean point contacts of one metal.",
+            sources=(HANDBOOK, CRC),
+            inputs=inputs,
+            computed="The law `holm` on Hertz's ellipse. The band is that of the radii.",
+            unit="microohm",
+            points=elastic,
+            meaning="Metals yield: above some tenths of a newton the elastic pressure is beyond their hardness, the spot grows like "
+            "F^(1/2) in place of F^(1/3), and the law resists too much, at 10 N by half or more. Fibrils are pressed by millinewtons, "
+            "but they are as much thinner: a touch yields where F > (pi H)^3 R^2 / (6 E*^2) or so. "
+            '`law = "power"` with an exponent of 1/2 is for those that do.',
+        ),
+        Comparison(
+            title="Gold at the force of a fibril's touch",
+            measured="A microrelay's gold contact at 0.1 mN, without films after cleaning.",
+            sources=(TRINGE,),
+            inputs=(
+                Input("force", "0.1 mN", TRINGE),
+                Input("resistivity", "22 nohm m", None, "bulk gold, handbooks; plated gold a little more"),
+                Input("modulus, Poisson ratio", "78 GPa, 0.44", None, "handbooks"),
+                Input("radius", "4 to 8 um", None, "of such relays' bumps; it enters by its cube root"),
+                Input("'about'", "80 to 120 mohm", None, "one digit is stated"),
+            ),
+            computed="The law `holm` of two such cylinders that cross. The band is that of the radii.",
+            unit="milliohm",
+            points=(Point(f"{metal}, 0.1 mN", Band(80.0, 120.0), Band(min(spot), max(spot))),),
+            meaning="The spot is 0.2 um wide, a few free paths of the electrons (38 nm): that adds some 15 % to Holm's resistance, "
+            "which the law has not, and roughness more. A third to a half is missing, as clean and smooth spots would have it.",
+        ),
+    )

@@ -1,0 +1,68 @@
+"""Holds the program against published measurements and writes docs/validation.md.
+
+make validation        (or: python validation/write.py, minutes)
+"""
+
+# ruff: noqa: E501 (sentences of the page)
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import crossings
+import rods
+import weaves
+import wires
+from comparison import Comparison
+
+PAGE = Path(__file__).parent.parent / "docs" / "validation.md"
+HEAD = """# Validation
+
+The program held against what others measured, `make validation` writes this page. Each comparison states its inputs and where they are from before
+the result. None of them was fitted to what is compared: where a number is not stated it is assumed, with the reason, and what that leaves open is a band.
+Measured and computed agree where their bands meet; where they do not, the factor says by how much, and the text why, as far as it is understood.
+[Verification](verification.md) is about something else: whether the equations are solved.
+"""
+OPEN = """## What was looked for and not found
+
+Papers that measure these are known, but not with all inputs where they could be read:
+
+* a crossing of two stainless-steel yarns or of two carbon filaments under a stated force (leads: Vasile et al., AUTEX Research Journal 17 (2017) 170; Hertleer
+  et al., AUTEX Research Journal 20 (2020) 133);
+* force against strain of a plain weave with yarn curves and geometry (Kawabata, Niwa & Kawai, J. Text. Inst. 64 (1973) 21; Buet-Gautier & Boisse, Exp. Mech. 41
+  (2001) 260; King et al., Int. J. Solids Struct. 42 (2005) 3867), and the crimp interchange in biaxial tests. Peirce's geometry is what `tests/test_peirce.py` has in place of it;
+* resistance against strain of woven sensors point by point (Knezic et al., Materials 14 (2021) 3390 has tables);
+* yarns flattened by twist and force (Afrashteh et al., Indian J. Fibre Text. Res. 38 (2013) 126): twist is not in the model yet.
+"""
+
+
+def page(comparisons: Sequence[Comparison]) -> str:
+    """All of it in Markdown."""
+    points, hits = sum(len(each.points) for each in comparisons), sum(each.hits for each in comparisons)
+    rows = [f"| [{each.title}](#{anchor(each.title)}) | {each.hits} of {len(each.points)} |" for each in comparisons]
+    count = f"**{hits} of {points} numbers agree, {points - hits} are missed.**"
+    table = "\n".join(["| | agree |", "|---|---|", *rows])
+    return "\n".join([HEAD, count, "", table, "", *(each.text() for each in comparisons), OPEN])
+
+
+def anchor(title: str) -> str:
+    """The name of a heading in the page."""
+    return "".join(c for c in title.lower().replace(" ", "-") if c.isalnum() or c == "-")
+
+
+def main() -> None:
+    found = [
+        wires.compare(),
+        weaves.heater(),
+        *crossings.compare(),
+        *rods.compare(),
+        weaves.sheets(),
+        weaves.sensor(),
+        weaves.screen(),
+    ]
+    PAGE.write_text(page(found), encoding="utf-8")
+    print(f"wrote {PAGE}")
+
+
+if __name__ == "__main__":
+    main()

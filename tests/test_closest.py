@@ -180,7 +180,7 @@ def test_the_foot_of_a_normal_is_found_from_anywhere_and_found_again(
 
     def search(start: float) -> float:
         meeting, curve = _Meeting(0, 0, 0, 7, 1.0, quick), curve_through(table, r)
-        return float(_root(curve, hulls(curve), meeting, start, k, k + 1.0, 1.0, scratch))
+        return float(_root(curve, hulls(curve).power, meeting, start, k, k + 1.0, 1.0, scratch))
 
     found = search(k + start)
     assert found == pytest.approx(s, abs=1e-12)

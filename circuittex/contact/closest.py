@@ -131,21 +131,21 @@ def _find(curve: Any, hull: Any, fibrils: Any, points: Any, rows: Any, found: An
                     slope, far = _at_node(r, tangent, x, node + k)
                 next_slope, next_far = _at_node(r, tangent, x, node + k + 1)
                 if k == 0 and not _negative(slope):
-                    count = _record(curve, hull, meeting, 0.0, 1.0, scratch, found, count)
+                    count = _record(curve, power, meeting, 0.0, 1.0, scratch, found, count)
                 rises = (np.sqrt(max(far, next_far)) + bulge[j]) * bend[j] < speed[j] ** 2
                 if own or not rises:
                     itself = t + a - j if own else -1.0
                     _coefficients(hull.points[j], x, scratch.pieces[0])
                     scratch.pieces[0, 0], scratch.pieces[0, 5] = slope, next_slope
-                    count = _isolate(curve, hull, meeting, k, itself, scratch, found, count)
+                    count = _isolate(curve, power, meeting, k, itself, scratch, found, count)
                 elif quick and _negative(slope) and not _negative(next_slope):
                     s = _quick_root(power[j], x, k, 1e-14 * n, k + start, float(k), k + 1.0, 1.0)
                     count = _keep(i, p, s, reach - _quick_distance(power[j], s - k, x), 1.0, found, count)
                 elif _negative(slope) and not _negative(next_slope):
-                    s = _root(curve, hull, meeting, k + start, float(k), k + 1.0, 1.0, scratch)
-                    count = _record(curve, hull, meeting, s, 1.0, scratch, found, count)
+                    s = _root(curve, power, meeting, k + start, float(k), k + 1.0, 1.0, scratch)
+                    count = _record(curve, power, meeting, s, 1.0, scratch, found, count)
                 if k == n - 1 and _negative(next_slope):
-                    count = _record(curve, hull, meeting, float(n), 1.0, scratch, found, count)
+                    count = _record(curve, power, meeting, float(n), 1.0, scratch, found, count)
                 known, slope, far = k + 1, next_slope, next_far
     return count
 
@@ -182,12 +182,12 @@ def _negative(value: float) -> bool:
 
 
 @compiled
-def _record(curve: Any, hull: Any, meeting: Any, s: float, sign: float, scratch: Any, found: Any, count: int) -> int:
+def _record(curve: Any, power: Any, meeting: Any, s: float, sign: float, scratch: Any, found: Any, count: int) -> int:
     """Keep the place s if it is within reach."""
     k = min(meeting.n - 1, int(s))
     x, y, interval = scratch.x, scratch.place[0], meeting.base + k
     if meeting.quick:
-        distance = _quick_distance(hull.power[interval], s - k, x)
+        distance = _quick_distance(power[interval], s - k, x)
     else:
         evaluate(curve.basis[curve.kind[interval]], curve.r, curve.window[interval], s - k, 0, scratch.weight, y)
         distance = np.sqrt((x[0] - y[0]) ** 2 + (x[1] - y[1]) ** 2 + (x[2] - y[2]) ** 2)
@@ -205,16 +205,22 @@ def _keep(row: int, point: int, s: float, overlap: float, sign: float, found: An
 
 
 @compiled
-def _root(curve: Any, hull: Any, meeting: Any, s: float, low: float, high: float, sign: float, scratch: Any) -> float:
+def _root(curve: Any, power: Any, meeting: Any, s: float, low: float, high: float, sign: float, scratch: Any) -> float:
     """The root of sign phi', which rises from low to high (in nodes, on one interval), by Newton's method from s.
 
     Bisection keeps it between its bounds.
     """
-    k, close = int(low), 1e-14 * meeting.n
+    x, place, weight, r, k, close = scratch.x, scratch.place, scratch.weight, curve.r, int(low), 1e-14 * meeting.n
     if meeting.quick:
-        return _quick_root(hull.power[meeting.base + k], scratch.x, k, close, s, low, high, sign)
+        return _quick_root(power[meeting.base + k], x, k, close, s, low, high, sign)
+    basis, window = curve.basis[curve.kind[meeting.base + k]], curve.window[meeting.base + k]
     for _ in range(MAX_STEPS):
-        slope, bend = _slope(curve, meeting.base + k, s - k, scratch)
+        for derivative in range(3):
+            evaluate(basis, r, window, s - k, derivative, weight, place[derivative])
+        slope, bend = 0.0, 0.0
+        for c in range(3):
+            slope -= (x[c] - place[0, c]) * place[1, c]
+            bend += place[1, c] * place[1, c] - (x[c] - place[0, c]) * place[2, c]
         low, high, new = _step(s, sign * slope, sign * bend, low, high, close)
         if abs(new - s) <= close:
             return new
@@ -249,21 +255,8 @@ def _step(s: float, slope: float, bend: float, low: float, high: float, close: f
 
 
 @compiled
-def _slope(curve: Any, interval: int, t: float, scratch: Any) -> tuple[float, float]:
-    """phi' and phi'' at t of an interval, by the weights of its nodes."""
-    x, place, slope, bend = scratch.x, scratch.place, 0.0, 0.0
-    basis, window = curve.basis[curve.kind[interval]], curve.window[interval]
-    for derivative in range(3):
-        evaluate(basis, curve.r, window, t, derivative, scratch.weight, place[derivative])
-    for c in range(3):
-        slope -= (x[c] - place[0, c]) * place[1, c]
-        bend += place[1, c] * place[1, c] - (x[c] - place[0, c]) * place[2, c]
-    return slope, bend
-
-
-@compiled
 def _quick_slope(power: Any, t: float, x: Any) -> tuple[float, float]:
-    """The same by the coefficients of the powers of t: equal but for rounding, and several times quicker."""
+    """phi' and phi'' at t of an interval by the coefficients of its powers: the same but for rounding, and quicker."""
     slope, bend = 0.0, 0.0
     for c in range(3):
         away, speed = _cubic(power, c, t) - x[c], power[1, c] + t * (2 * power[2, c] + t * 3 * power[3, c])
@@ -286,7 +279,7 @@ def _cubic(power: Any, c: int, t: float) -> float:
 
 
 @compiled
-def _isolate(curve: Any, hull: Any, meeting: Any, k: int, itself: float, scratch: Any, found: Any, count: int) -> int:
+def _isolate(curve: Any, power: Any, meeting: Any, k: int, itself: float, scratch: Any, found: Any, count: int) -> int:
     """All places on interval k of a fibril on which phi' may fall, in their order.
 
     The first of the scratch's pieces holds its Bernstein coefficients. `itself`: where the contact point itself lies,
@@ -317,8 +310,8 @@ def _isolate(curve: Any, hull: Any, meeting: Any, k: int, itself: float, scratch
         top -= 1
         if changes % 2 == 1:
             sign = -1.0 if falling else 1.0
-            s = _root(curve, hull, meeting, k + 0.5 * (low + high), k + low, k + high, sign, scratch)
-            count = _record(curve, hull, meeting, s, sign, scratch, found, count)
+            s = _root(curve, power, meeting, k + 0.5 * (low + high), k + low, k + high, sign, scratch)
+            count = _record(curve, power, meeting, s, sign, scratch, found, count)
     return count
 
 

@@ -7,8 +7,8 @@ Seconds are the processor's, of all threads: other work on the machine changes t
 whatever the size, "without" never; `relax` chooses by `WORTH_A_DESCENT`. "Tiled" starts from copies of the relaxed
 smallest cell, whose seconds count. Yarns of other than 3 or 10 filaments have the section of those of 10, in a
 round outline, and Hertz's penalty. The exponents compare a row with the one before it of the same kind, against the
-unknowns. With --keep the results are added to those in a file, of which --figure draws all. Takes minutes, with 16 x 16
-yarns or 100 filaments more.
+unknowns. With --keep the results are added to those in a file, which are all told, and drawn with --figure. Takes
+minutes, with 16 x 16 yarns or 100 filaments more.
 """
 
 from __future__ import annotations
@@ -165,7 +165,9 @@ def exponent(small: Result, large: Result, cost: str) -> float:
 
 def main() -> None:
     parser = arguments(__doc__)
-    parser.add_argument("--yarns", type=int, nargs="+", default=[2, 4, 8], help="yarns each way")
+    parser.add_argument(
+        "--yarns", type=int, nargs="*", default=[2, 4, 8], help="yarns each way; none: tell what is kept"
+    )
     parser.add_argument("--filaments", type=int, nargs="+", default=[10], help="of a yarn")
     parser.add_argument("--per-crossing", type=int, default=5, help="elements of a fibril from crossing to crossing")
     parser.add_argument("--ways", nargs="+", choices=WAYS, default=WAYS[:2], help="what to compare")

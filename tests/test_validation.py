@@ -28,7 +28,7 @@ def numbers(text: str) -> list[float]:
 
 def test_the_page_has_what_is_computed(script: Any) -> None:
     """Those that take no relaxation, all of them again; words are the same, and numbers within what is printed."""
-    found = [script("wires").compare(), *script("rods").compare()]
+    found = [script("wires").compare(), script("rods").steel(), *script("rods").compare()]
     for comparison in found:
         mine = comparison.text().strip()
         start = PAGE.index(f"## {comparison.title}\n")

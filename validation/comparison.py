@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 
 CLOSE = 1e-9
 """Bands that meet within this agree."""
@@ -46,6 +47,8 @@ class Band:
 
     def text(self) -> str:
         low, high = (f"{value:.3g}" for value in (self.low, self.high))
+        if self.high == inf:
+            return f"{low} or more"
         return low if low == high else f"{low} to {high}"
 
 

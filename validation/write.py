@@ -27,9 +27,9 @@ OPEN = """## What was looked for and not found
 
 Papers that measure these are known, but not with all inputs where they could be read:
 
-* a crossing of two stainless-steel yarns or of two carbon filaments under a stated force (leads: Vasile et al., AUTEX Research Journal 17 (2017) 170; Hertleer
-  et al., AUTEX Research Journal 20 (2020) 133);
-* force against strain of a plain weave with yarn curves and geometry (Kawabata, Niwa & Kawai, J. Text. Inst. 64 (1973) 21; Buet-Gautier & Boisse, Exp. Mech. 41
+* the resistance, in ohm, of a crossing of two stainless-steel yarns or of two carbon filaments under a stated force (leads: Vasile et al., AUTEX Research Journal
+  17 (2017) 170; Hertleer et al., AUTEX Research Journal 20 (2020) 133);
+* forces, point by point, against strain of a plain weave with yarn curves and geometry (Kawabata, Niwa & Kawai, J. Text. Inst. 64 (1973) 21; Buet-Gautier & Boisse, Exp. Mech. 41
   (2001) 260; King et al., Int. J. Solids Struct. 42 (2005) 3867), and the crimp interchange in biaxial tests. Peirce's geometry is what `tests/test_peirce.py` has in place of it;
 * resistance against strain of woven sensors point by point (Knezic et al., Materials 14 (2021) 3390 has tables);
 * yarns flattened by twist and force (Afrashteh et al., Indian J. Fibre Text. Res. 38 (2013) 126): twist is not in the model yet.
@@ -55,9 +55,11 @@ def main() -> None:
         wires.compare(),
         weaves.heater(),
         *crossings.compare(),
+        rods.steel(),
         *rods.compare(),
         weaves.sheets(),
         weaves.sensor(),
+        weaves.aramid(),
         weaves.screen(),
     ]
     PAGE.write_text(page(found), encoding="utf-8")

@@ -42,7 +42,7 @@ ZHU = Source(
     "Zhu",
     "D. Zhu, B. Mobasher, A. Vaidya, S. D. Rajan, Compos. Sci. Technol. 74 (2013) 121, the same fabric: plain, 17 x 17 yarns an inch, 0.28 mm thick, "
     "0.115 mm2 of fibres in a yarn (from memory, not read again)",
-    "https://doi.org/10.1016/j.compscitech.2012.10.012",
+    "https://bvbvf1.bib-bvb.de/vufind/PrimoRecord/cdi_proquest_miscellaneous_1349472827",
 )
 PAD = Source(
     "Arduino forum",

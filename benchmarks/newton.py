@@ -69,7 +69,7 @@ class SuperLU:
 
     name = "scipy splu"
 
-    def factor(self, pattern: Pattern, data: Floats) -> Solve:
+    def factor(self, pattern: Pattern, data: Floats, *, rough: bool = False) -> Solve:
         """A function that solves with the matrix, zeros left out."""
         shape = (pattern.n_dofs, pattern.n_dofs)
         upper = sp.csr_array((data, pattern.indices, pattern.indptr), shape=shape)

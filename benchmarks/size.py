@@ -59,9 +59,9 @@ class Counted:
     name: str = "counted"
     calls: int = 0
 
-    def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
+    def factor(self, pattern: Pattern, data: Floats, *, rough: bool = False) -> Solve | None:
         self.calls += 1
-        return self.solver.factor(pattern, data)
+        return self.solver.factor(pattern, data, rough=rough)
 
 
 def cell(yarns: int, filaments: int, per_crossing: int) -> Design:

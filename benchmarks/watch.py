@@ -120,9 +120,9 @@ class WatchedSolver:
     matrix: tuple[Pattern, Floats] | None = None
     _pattern: Pattern | None = None
 
-    def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
+    def factor(self, pattern: Pattern, data: Floats, *, rough: bool = False) -> Solve | None:
         clock = time.perf_counter()
-        solve = self.solver.factor(pattern, data)
+        solve = self.solver.factor(pattern, data, rough=rough)
         part = ANALYSIS if pattern is not self._pattern else (REFUSED if solve is None else FACTOR)
         self.watch.add(part, clock)
         self._pattern = pattern

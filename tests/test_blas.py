@@ -13,7 +13,9 @@ from circuittex.base.arrays import Floats
 from circuittex.solvers.blas import _routine, cholesky, solve_border, subtract_products
 
 ROUND_OFF = 1e-12
-"""Relative: a few hundred operations for each value, and condition numbers of some hundred."""
+"""Relative: a few hundred operations for each value, and condition numbers of some hundred; in single precision as many
+units of that."""
+SINGLE = float(np.finfo(np.float32).eps / np.finfo(float).eps)
 
 
 def stiff(p: int) -> Floats:
@@ -22,19 +24,23 @@ def stiff(p: int) -> Floats:
     return np.asarray(A @ A.T + p * np.eye(p))
 
 
+@pytest.mark.parametrize("single", [False, True])
 @pytest.mark.parametrize(("p", "b"), [(1, 1), (3, 7), (40, 9), (70, 70)])
-def test_parts_of_the_factor(p: int, b: int) -> None:
+def test_parts_of_the_factor(p: int, b: int, single: bool) -> None:
+    dtype, close = (np.float32, SINGLE * ROUND_OFF) if single else (np.float64, ROUND_OFF)
     K, rng = stiff(p), np.random.default_rng(b)
     border, update = rng.normal(size=(p, b)), rng.normal(size=(b, b))
     U = np.linalg.cholesky(K).T
     expected = np.linalg.solve(U.T, border)
     products = update - expected.T @ expected
-    triangle, below = K.copy(), np.tril(update, -1)
+    triangle, border, update = (np.ascontiguousarray(each, dtype=dtype) for each in (K, border, update))
+    below = np.tril(update, -1)
     assert cholesky(triangle)
     solve_border(triangle, border)
     subtract_products(border, update)
     for found, wanted in ((np.triu(triangle), U), (border, expected), (np.triu(update), np.triu(products))):
-        assert np.abs(found - wanted).max() <= ROUND_OFF * np.abs(wanted).max()
+        assert np.abs(found - wanted).max() <= close * np.abs(wanted).max()
+        assert found.dtype == dtype
     assert np.array_equal(np.tril(update, -1), below)
 
 

@@ -282,9 +282,9 @@ def test_refused_factorisations_only_cost_iterations(cell: Cell, seed: int) -> N
         name = "refusing"
         in_a_row = 0
 
-        def factor(self, pattern: Pattern, data: np.ndarray) -> Solve | None:
+        def factor(self, pattern: Pattern, data: np.ndarray, *, rough: bool = False) -> Solve | None:
             self.in_a_row = self.in_a_row + 1 if rng.random() < 0.6 and self.in_a_row < 5 else 0
-            return None if self.in_a_row else inner.factor(pattern, data)
+            return None if self.in_a_row else inner.factor(pattern, data, rough=rough)
 
     moved = move(relaxed.configuration, np.eye(2), np.diag([1.01, 1.0]))
     expected = solved(design, mesh, moved)

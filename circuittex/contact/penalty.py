@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats, Ints
-from circuittex.base.compiled import cores, side_by_side
+from circuittex.base.compiled import cores, share_out, side_by_side
 from circuittex.base.errors import PenetrationError
 from circuittex.base.frozen import frozen
 from circuittex.contact.closest import Fibrils, Found, find_contacts
@@ -167,15 +166,15 @@ class PenaltyContact:
         hull = hulls(curve)
         edges = np.linspace(0, len(candidates.interval), CHUNKS + 1).astype(int)
 
-        def piece(first: int, last: int) -> Found:
+        def piece(k: int) -> Found:
+            first, last = edges[k], edges[k + 1]
             rows = Candidates(*(column[first:last] for column in candidates))
             found = find_contacts(
                 curve, hull, self.fibrils, points, rows, points.shape[1] * (last - first), quick=quick
             )
             return found._replace(row=found.row + first)
 
-        with ThreadPoolExecutor(cores()) as pool:
-            pieces = list(pool.map(piece, edges[:-1], edges[1:]))
+        pieces = share_out(piece, CHUNKS, cores())
         found = Found(*map(np.concatenate, zip(*pieces, strict=True)))
         interval = candidates.interval[found.row]
         first = table.first_interval[table.fibril[interval]]

@@ -21,5 +21,8 @@ class LinearSolver(Protocol):
 
     name: str
 
-    def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
-        """A function that solves with the matrix, or None if it is not positive definite."""
+    def factor(self, pattern: Pattern, data: Floats, *, rough: bool = False) -> Solve | None:
+        """A function that solves with the matrix, or None if it is not positive definite.
+
+        Where `rough`, it may be as rough as single precision makes it, for the sake of time and memory.
+        """

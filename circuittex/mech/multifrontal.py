@@ -35,13 +35,19 @@ class MultifrontalSolver:
         self._coupled = Coupled()
         self._cholesky: Cholesky | None = None
 
-    def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
-        """A function that solves with the matrix (until the next call), or None if a pivot is not positive."""
+    def factor(self, pattern: Pattern, data: Floats, *, rough: bool = False) -> Solve | None:
+        """A function that solves with the matrix (until the next call), or None if a pivot is not positive.
+
+        In single precision where `rough` solutions will do.
+        """
+        last = self._cholesky
+        analysis = None if last is None else last.analysis
         if self._coupled.renew(pattern, data):
-            last = self._cholesky
-            analysis = None if last is None else last.analysis
-            self._cholesky = Cholesky(analysed(pattern, self._coupled, analysis), last)
-        assert self._cholesky is not None, "no pairs were renewed"
+            analysis = analysed(pattern, self._coupled, analysis)
+        assert analysis is not None, "no pairs were renewed"
+        if last is None or analysis is not last.analysis or last.single != rough:
+            self._cholesky = Cholesky(analysis, last, single=rough)
+        assert self._cholesky is not None
         return self._cholesky.factor(data[self._coupled.entries])
 
 

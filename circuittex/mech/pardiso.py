@@ -50,8 +50,9 @@ class PardisoSolver:
         self._pardiso.set_phase(phase)
         return np.asarray(self._pardiso._call_pardiso(self._matrix, b))
 
-    def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
-        """A function that solves with the matrix (until the next call), or None if it is not positive definite."""
+    def factor(self, pattern: Pattern, data: Floats, *, rough: bool = False) -> Solve | None:
+        """A function that solves with the matrix (until the next call), or None if it is not positive definite; in
+        double precision, `rough` or not."""
         nothing = np.zeros(pattern.n_dofs)
         if self._coupled.renew(pattern, data):
             self._release()

@@ -76,13 +76,13 @@ class System:
         self.held = np.flatnonzero(~(self.free[rows] & self.free[pattern.indices]))
         return pattern
 
-    def factor(self, solver: LinearSolver, shift: float, softening: float) -> Solve | None:
-        """The shifted tangent's factor, None where it is not positive definite.
+    def factor(self, solver: LinearSolver, shift: float, softening: float, *, rough: bool = False) -> Solve | None:
+        """The shifted tangent's factor, None where it is not positive definite; `rough` as solvers take it.
 
         Its roots would be rounded otherwise at another scale, so what is factorised has no unit (`matrix`).
         """
         assert self.pattern is not None
-        solve = solver.factor(self.pattern, self.matrix(shift, softening))
+        solve = solver.factor(self.pattern, self.matrix(shift, softening), rough=rough)
         if solve is not None and self.motions is not None:  # of positions alone: in these units they are what they were
             whole = self._whole(shift, softening), self.pattern.indices, self.pattern.indptr
             solve = self.motions.solve(solve, sp.csr_array(whole, shape=(self.n, self.n)), self.free)

@@ -49,6 +49,25 @@ class Front:
     """where in `places` runs of successive ones begin, none of them of pivots and others; and, last, b."""
 
 
+class Tables(NamedTuple):
+    """Where fronts begin and end, as compiled functions take them."""
+
+    first: Ints
+    """(K + 1,) first pivot of each; and, last, the number of unknowns."""
+    start: Ints
+    """(K,) where in the factor its values begin."""
+    cut: Ints
+    """(K + 1,) where its border begins in `border` and `places`."""
+    border: Ints
+    """the unknowns of all borders."""
+    places: Ints
+    """where those are in the front above."""
+    eldest: Ints
+    """(K + 1,) where those right below it begin in `below`."""
+    below: Ints
+    """numbers of those right below each, rising."""
+
+
 @frozen
 class Analysis:
     """What a factorisation needs to know besides the values."""
@@ -66,7 +85,11 @@ class Analysis:
     least: float
     """floating-point operations that a factorisation took when the blocks were dissected."""
     subtrees: tuple[range, ...]
-    """fronts to eliminate one after another, side by side with those of other ranges; the last is above all others."""
+    """fronts to eliminate one after another, side by side with those of other ranges."""
+    top: Ints
+    """fronts that are above those of all ranges, rising."""
+    tables: Tables
+    """the fronts, for compiled functions."""
 
 
 @frozen
@@ -144,9 +167,9 @@ def analyse(blocks: Blocks, entries: Entries, last: Analysis | None = None) -> A
     breaks[cut[:-1][b > 0]] = True
     runs = np.flatnonzero(breaks)
     run_cut = np.searchsorted(runs, cut)
-    below: list[list[int]] = [[] for _ in p]
-    for k in np.flatnonzero(above >= 0).tolist():
-        below[above[k]].append(k)
+    under = np.flatnonzero(above >= 0)
+    under = under[np.argsort(above[under], kind="stable")]
+    eldest = np.searchsorted(above[under], np.arange(len(p) + 1))
     size = p * (p + b)
     start = np.cumsum(size) - size
     fronts = tuple(
@@ -156,7 +179,7 @@ def analyse(blocks: Blocks, entries: Entries, last: Analysis | None = None) -> A
             border=border[cut[k] : cut[k + 1]],
             start=int(start[k]),
             above=int(above[k]),
-            below=tuple(below[k]),
+            below=tuple(under[eldest[k] : eldest[k + 1]].tolist()),
             places=places[cut[k] : cut[k + 1]],
             runs=np.append(runs[run_cut[k] : run_cut[k + 1]], cut[k + 1]) - cut[k],
         )
@@ -164,6 +187,8 @@ def analyse(blocks: Blocks, entries: Entries, last: Analysis | None = None) -> A
     )
     target = np.empty(len(entries.used), dtype=np.int64)
     _locate(entries.used, entries.indptr, entries.indices, place, front_of, layout, start, target)
+    parts = subtrees(above, operations_of(p.astype(float), b.astype(float)))
+    inside = np.concatenate([np.arange(part.start, part.stop) for part in parts])
     return Analysis(
         permutation=permutation,
         fronts=fronts,
@@ -171,7 +196,9 @@ def analyse(blocks: Blocks, entries: Entries, last: Analysis | None = None) -> A
         size=int(size.sum()),
         blocks=tree.blocks,
         least=least,
-        subtrees=subtrees(above, operations_of(p.astype(float), b.astype(float))),
+        subtrees=parts,
+        top=np.setdiff1d(np.arange(len(p)), inside),
+        tables=Tables(np.append(first, len(permutation)), start, cut, border, places, eldest, under),
     )
 
 

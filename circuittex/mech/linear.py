@@ -23,3 +23,6 @@ class LinearSolver(Protocol):
 
     def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
         """A function that solves with the matrix, or None if it is not positive definite."""
+
+    def forget(self) -> None:
+        """What comes next is computed as by a new solver, to the last bit."""

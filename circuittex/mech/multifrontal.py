@@ -33,16 +33,20 @@ class MultifrontalSolver:
 
     def __init__(self) -> None:
         self._coupled = Coupled()
+        self._analysis: Analysis | None = None
         self._cholesky: Cholesky | None = None
 
     def factor(self, pattern: Pattern, data: Floats) -> Solve | None:
         """A function that solves with the matrix (until the next call), or None if a pivot is not positive."""
         if self._coupled.renew(pattern, data):
-            last = self._cholesky
-            analysis = None if last is None else last.analysis
-            self._cholesky = Cholesky(analysed(pattern, self._coupled, analysis), last)
+            self._analysis = analysed(pattern, self._coupled, self._analysis)
+            self._cholesky = Cholesky(self._analysis, self._cholesky)
         assert self._cholesky is not None, "no pairs were renewed"
         return self._cholesky.factor(data[self._coupled.entries])
+
+    def forget(self) -> None:
+        """The next matrix is analysed as by a new solver; the memory of the factor stays."""
+        self._coupled, self._analysis = Coupled(), None
 
 
 def analysed(pattern: Pattern, coupled: Coupled, last: Analysis | None = None) -> Analysis:

@@ -27,7 +27,7 @@ UNFINISHED = ".circuittex.relaxation.npz"
 """The name of the file, which nobody else uses."""
 AGAIN = "the first relaxation starts from its beginning"
 _KEYS = tuple(each.name for each in fields(Checkpoint))
-_SPOILT = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
+_SPOILT = (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile)
 """What a damaged file makes NumPy raise."""
 
 
@@ -73,8 +73,8 @@ def _read(path: Path, marks: dict[str, str], unknowns: int) -> Checkpoint | None
         return None
     scalars = {name: value.item() for name, value in values.items() if value.ndim == 0}
     checkpoint = Checkpoint(**values | scalars)
-    rows = checkpoint.steps.shape
-    if checkpoint.q.shape != (unknowns,) or rows[1:] != (unknowns,) or checkpoint.turns.shape != rows:
+    wanted = (len(checkpoint.curvatures), unknowns)
+    if (checkpoint.steps.shape, checkpoint.turns.shape, checkpoint.q.shape) != (wanted, wanted, wanted[1:]):
         _note(f"{path}: it has {checkpoint.q.size} unknowns in place of {unknowns}, and {AGAIN}")
         return None
     return checkpoint

@@ -79,6 +79,9 @@ class SuperLU:
         solve: Solve = splu(full, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).solve
         return solve
 
+    def forget(self) -> None:
+        """Nothing is remembered."""
+
 
 def installed() -> list[Callable[[], LinearSolver]]:
     """circuittex's own solver, PARDISO where it is installed, and SciPy's as the peer of both."""

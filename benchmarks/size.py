@@ -63,6 +63,9 @@ class Counted:
         self.calls += 1
         return self.solver.factor(pattern, data, rough=rough)
 
+    def forget(self) -> None:
+        self.solver.forget()
+
 
 def cell(yarns: int, filaments: int, per_crossing: int) -> Design:
     """The design of one size; fibrils of few yarns have as many elements as those of four."""

@@ -78,6 +78,9 @@ class WatchedTerm:
             self.watch.add(self.parts[0], clock)
         return changed
 
+    def forget(self) -> None:
+        self.term.forget()
+
     def pairs(self) -> tuple[Ints, Ints]:
         self.watch.asked = min(self.watch.asked, time.perf_counter())
         return self.term.pairs()
@@ -130,6 +133,9 @@ class WatchedSolver:
             return None
         self.matrix = pattern, data
         return self._timed(solve)
+
+    def forget(self) -> None:
+        self.solver.forget()
 
     def _timed(self, solve: Solve) -> Solve:
         def timed(b: Floats) -> Floats:

@@ -12,6 +12,7 @@ from synthetic_study import synthetic_study
 from circuittex import __version__
 from circuittex.base.arrays import Floats
 from circuittex.base.frozen import same
+from circuittex.mech.checkpoint import NONE, Checkpoints
 from circuittex.mech.configuration import Configuration
 from circuittex.relaxation.increment import Increment
 from circuittex.relaxation.relax import Equilibrium
@@ -45,7 +46,13 @@ class Canned:
         """Called before a state is reached."""
 
     def reach(
-        self, study: Study, step: Step, start: Configuration, solver: object, say: Callable[[str], None]
+        self,
+        study: Study,
+        step: Step,
+        start: Configuration,
+        solver: object,
+        say: Callable[[str], None],
+        checkpoints: Checkpoints = NONE,
     ) -> Increment:
         assert study.records == ()
         known = self.records[step.previous].configuration if step.previous else self.study.initial

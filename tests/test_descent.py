@@ -37,6 +37,9 @@ class Witness:
     def prepare(self, q: Floats) -> bool:
         return False
 
+    def forget(self) -> None:
+        pass
+
     def pairs(self) -> tuple[np.ndarray, np.ndarray]:
         return np.empty((0, 2), dtype=np.int64), np.empty((0, 2), dtype=np.int64)
 

@@ -222,6 +222,14 @@ def test_what_the_relaxed_state_takes_corrects_the_steps() -> None:
     assert rest.seconds() == pytest.approx(4 * 3 * 60.0)
 
 
+def test_a_relaxed_state_that_an_earlier_run_began_says_nothing_of_the_steps() -> None:
+    clock, foreseen = Clock(), Forecast(100.0, 60.0, 1, 1e9)
+    rest = Rest(Counter({"": 1, "a": 4}), 5, 1, lambda _: None, clock, foreseen, partly=True)
+    clock.now = 10.0
+    rest.done("")
+    assert rest.seconds() == pytest.approx(4 * 60.0)
+
+
 def test_fewer_workers_than_were_asked_for_are_told() -> None:
     rest = Rest(Counter({"a": 2, "b": 2}), 9, 4, lambda _: None, lambda: 0.0, Forecast(0.0, 60.0, 1, 4e9))
     assert rest.opening() == "about 4 min, 4.0 GB; 4 states, by 1 instead of 2 workers for want of memory"

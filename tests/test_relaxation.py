@@ -286,6 +286,9 @@ def test_refused_factorisations_only_cost_iterations(cell: Cell, seed: int) -> N
             self.in_a_row = self.in_a_row + 1 if rng.random() < 0.6 and self.in_a_row < 5 else 0
             return None if self.in_a_row else inner.factor(pattern, data, rough=rough)
 
+        def forget(self) -> None:
+            inner.forget()
+
     moved = move(relaxed.configuration, np.eye(2), np.diag([1.01, 1.0]))
     expected = solved(design, mesh, moved)
     found = relax(mesh, design, moved, solver=Refusing())

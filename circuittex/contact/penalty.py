@@ -126,6 +126,11 @@ class PenaltyContact:
             self._held, self._own = held, bent_back(self.table, held[0], turn, LIKELY)
         return renewed
 
+    def forget(self) -> None:
+        """The next candidates are searched around where they are asked for."""
+        self._held = self._tried = self._wide = self._last = None
+        self._own = np.empty(0, dtype=np.bool_)
+
     def _near(self, r: Floats) -> tuple[Candidates, Floats]:
         """Candidates that hold every pair in touch at r: since their search no Bézier point moved by half the skin."""
         for known in (self._held, self._tried):

@@ -84,6 +84,9 @@ class Beam:
         """Elements couple the same nodes for ever."""
         return False
 
+    def forget(self) -> None:
+        """There is nothing that changes."""
+
     def pairs(self) -> tuple[Ints, Ints]:
         """All node pairs of each element, with all nine unknowns."""
         nodes = self.elements.nodes

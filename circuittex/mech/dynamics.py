@@ -114,6 +114,9 @@ class Inertia:
         """Its couplings never change."""
         return False
 
+    def forget(self) -> None:
+        """The matrices are those of the present pattern."""
+
     def pairs(self) -> tuple[Ints, Ints]:
         """None of its own: mass and damping couple the nodes that the beams couple already."""
         return np.empty((0, 2), dtype=np.int64), np.empty((0, 2), dtype=np.int64)

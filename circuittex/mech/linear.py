@@ -26,3 +26,6 @@ class LinearSolver(Protocol):
 
         Where `rough`, it may be as rough as single precision makes it, for the sake of time and memory.
         """
+
+    def forget(self) -> None:
+        """What comes next is computed as by a new solver, to the last bit."""

@@ -23,6 +23,9 @@ class DeadLoad:
     def prepare(self, q: Floats) -> bool:
         return False
 
+    def forget(self) -> None:
+        pass
+
     def pairs(self) -> tuple[Ints, Ints]:
         return np.empty((0, 2), dtype=np.int64), np.empty((0, 2), dtype=np.int64)
 

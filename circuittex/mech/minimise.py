@@ -17,7 +17,8 @@ import numpy as np
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.errors import ConvergenceError, CreepingError, PenetrationError
 from circuittex.base.frozen import frozen
-from circuittex.mech.descent import descend
+from circuittex.mech.checkpoint import NONE, Checkpoints
+from circuittex.mech.descent import descend, hand_over
 from circuittex.mech.linear import LinearSolver, Solve
 from circuittex.mech.motions import Motions
 from circuittex.mech.pattern import Pattern, diagonal, multiply
@@ -93,6 +94,7 @@ def minimise(
     may_creep: bool = True,
     stride: float = 0.0,
     report: Callable[[int, float], None] | None = None,
+    checkpoints: Checkpoints = NONE,
 ) -> Minimum:
     """The minimum of the terms' total potential that a descent from q (n_dofs,) reaches.
 
@@ -105,7 +107,8 @@ def minimise(
     other is 0.
 
     Where `stride` (mm) is not zero, a descent by gradients alone comes first (`descend`), none of whose steps moves a
-    node by more: many iterations, each a fraction of one of Newton's.
+    node by more: many iterations, each a fraction of one of Newton's. It goes on from what `checkpoints` tell of, and
+    tells them of the places, its end among them, from which another one can go on with the same result.
 
     Raises `ConvergenceError`, with the history, where that is not met at a minimum in `max_iterations`: an
     unconverged state is never returned. `CreepingError` where its steps are short and it may not creep,
@@ -117,7 +120,10 @@ def minimise(
     shift, place, refused, step, history = FIRST_SHIFT, 0, False, 1.0, []
     cheap = 0
     if stride > 0.0:
-        q, cheap = descend(system, solver, q, stride=stride, limits=(tolerance, force_tolerance), report=report)
+        bounds = tolerance, force_tolerance
+        q, cheap = descend(system, solver, q, stride=stride, limits=bounds, report=report, checkpoints=checkpoints)
+        if before is None:
+            hand_over(system, solver, q, cheap, checkpoints)
     for iteration in range(max_iterations + 1):
         pattern, energy, gradient = system.assemble(q)
         if iteration == 0:

@@ -33,6 +33,7 @@ class MultifrontalSolver:
 
     def __init__(self) -> None:
         self._coupled = Coupled()
+        self._analysis: Analysis | None = None
         self._cholesky: Cholesky | None = None
 
     def factor(self, pattern: Pattern, data: Floats, *, rough: bool = False) -> Solve | None:
@@ -40,15 +41,18 @@ class MultifrontalSolver:
 
         In single precision where `rough` solutions will do.
         """
-        last = self._cholesky
-        analysis = None if last is None else last.analysis
         if self._coupled.renew(pattern, data):
-            analysis = analysed(pattern, self._coupled, analysis)
-        assert analysis is not None, "no pairs were renewed"
-        if last is None or analysis is not last.analysis or last.single != rough:
-            self._cholesky = Cholesky(analysis, last, single=rough)
+            self._analysis = analysed(pattern, self._coupled, self._analysis)
+        last = self._cholesky
+        assert self._analysis is not None, "no pairs were renewed"
+        if last is None or last.analysis is not self._analysis or last.single != rough:
+            self._cholesky = Cholesky(self._analysis, last, single=rough)
         assert self._cholesky is not None
         return self._cholesky.factor(data[self._coupled.entries])
+
+    def forget(self) -> None:
+        """The next matrix is analysed as by a new solver; the memory of the factor stays."""
+        self._coupled, self._analysis = Coupled(), None
 
 
 def analysed(pattern: Pattern, coupled: Coupled, last: Analysis | None = None) -> Analysis:

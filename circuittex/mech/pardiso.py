@@ -69,6 +69,10 @@ class PardisoSolver:
             raise
         return lambda b: self._call(self._SOLVE, b)
 
+    def forget(self) -> None:
+        """The next matrix is analysed as by a new solver."""
+        self._coupled = Coupled()
+
     def _release(self) -> None:
         if self._matrix is not None:
             self._call(self._RELEASE, np.zeros(self._matrix.shape[0]))

@@ -65,6 +65,12 @@ class System:
             self.forces = np.maximum(self.forces, self.scales.forces(gradient - others))
         return self.pattern, energy, gradient
 
+    def forget(self) -> None:
+        """What comes next is computed as by a new system of new terms, to the last bit."""
+        self.pattern = None
+        for term in self.terms:
+            term.forget()
+
     def _renewed(self, q: Floats) -> Pattern:
         pairs = [term.pairs() for term in self.terms]
         full, point = (np.concatenate([p[k] for p in pairs]) for k in (0, 1))

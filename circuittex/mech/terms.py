@@ -14,6 +14,9 @@ class ForceTerm(Protocol):
     def prepare(self, q: Floats) -> bool:
         """Make the term valid around q; True if the node pairs it couples have changed."""
 
+    def forget(self) -> None:
+        """What comes next is computed as by a new term, to the last bit."""
+
     def pairs(self) -> tuple[Ints, Ints]:
         """Coupled nodes: full pairs (P, 2) with all nine unknowns, point pairs (P', 2) with the positions."""
 

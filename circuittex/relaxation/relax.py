@@ -17,6 +17,7 @@ from circuittex.design.restated import restated
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.beam import Beam
+from circuittex.mech.checkpoint import NONE, Checkpoints
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.mech.minimise import Minimum, minimise
@@ -83,6 +84,7 @@ def relax(
     gripped: str = "",
     solver: LinearSolver | None = None,
     report: Callable[[int, float], None] | None = None,
+    checkpoints: Checkpoints = NONE,
 ) -> Equilibrium:
     """The equilibrium that descent from `start` (by default the initial weave) reaches, ends held as there or under the
     design's clamp forces.
@@ -92,6 +94,10 @@ def relax(
     design gives a force for them; the others slide as the average deformation `gradient` (2, 2) of the start directs
     (`sliding`). From the initial weave of the design the descent is made in units of its own fibrils (`own_units`).
 
+    A descent by gradients tells `checkpoints` of the places from which the same call, given one of them, goes on to the
+    same equilibrium, bit for bit; they are in the units of the descent. Of several descents (`continued`) it is the
+    first, whose penalty is the true one.
+
     Raises `ConvergenceError` with the history where it is not reached.
     """
     woven, solver = initial_configuration(mesh), solver if solver is not None else MultifrontalSolver()
@@ -99,11 +105,11 @@ def relax(
     regular = before is None and same(start, woven) and same(mesh, build_mesh(design))
     ends = gradient, free_edges, "".join(axis for axis in "xy" if axis not in gripped + free_edges)
     if not regular or units == PLAIN:
-        return _relaxed(mesh, design, start, before, ends, solver, report, PLAIN)
+        return _relaxed(mesh, design, start, before, ends, solver, report, PLAIN, checkpoints)
     own = restated(design, units.length, units.modulus)
     there = build_mesh(own)
     try:
-        found = _relaxed(there, own, initial_configuration(there), None, ends, solver, report, units)
+        found = _relaxed(there, own, initial_configuration(there), None, ends, solver, report, units, checkpoints)
     except ConvergenceError as error:
         error.history = units.history(error.history)
         raise
@@ -131,6 +137,7 @@ def _relaxed(
     solver: LinearSolver,
     report: Callable[[int, float], None] | None,
     units: Units,
+    checkpoints: Checkpoints,
 ) -> Equilibrium:
     """The same in the units that mesh and design are in; `units` is what those are, for messages.
 
@@ -149,6 +156,7 @@ def _relaxed(
 
     def descend(q: Floats, part: float, may_creep: bool) -> Minimum:
         contact.part, true = part, part == 1.0
+        first = true and not may_creep  # of `continued`, which comes back to the true penalty with leave to creep
         return minimise(
             terms,
             q,
@@ -163,6 +171,7 @@ def _relaxed(
             may_creep=may_creep,
             stride=stride,
             report=report,
+            checkpoints=checkpoints if first else NONE,
         )
 
     q = space.vector(start)

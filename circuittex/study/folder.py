@@ -23,6 +23,7 @@ from circuittex.results.summary import write_summary
 from circuittex.results.vtk.vtu import write_collections, write_vtu
 from circuittex.study.circuits import StateCircuits
 from circuittex.study.export import circuits_of, netlist_files, write_netlists
+from circuittex.study.unfinished import remove_unfinished
 
 MARKS = {
     "netlists/*.sub": b"* circuittex ",
@@ -152,6 +153,7 @@ def remove_results(folder: Path) -> None:
     partial = [path for pattern in (*MARKS, "figures/*", "*") for path in folder.glob(pattern + PARTIAL)]
     for path in (*made_by_a_run(folder), *partial):
         path.unlink(missing_ok=True)
+    remove_unfinished(folder)
 
 
 def made_by_a_run(folder: Path) -> list[Path]:

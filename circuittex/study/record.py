@@ -18,6 +18,7 @@ from circuittex.electrical.network.ports import port_matrix
 from circuittex.fit import fit_network
 from circuittex.geometry.levels import levels
 from circuittex.geometry.mesh import FibrilMesh
+from circuittex.mech.checkpoint import NONE, Checkpoints
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.relaxation.increment import Increment, advance
@@ -41,12 +42,13 @@ def reach(
     start: Configuration,
     solver: Callable[[], LinearSolver],
     say: Callable[[str], None],
+    checkpoints: Checkpoints = NONE,
 ) -> Increment:
     """The equilibrium of a state, from the configuration `start` of the one before it and from nothing else.
 
     The solver is made anew, so that the result cannot depend on what was computed before: a study that goes on from
     stored states finds what an uninterrupted one does. `say` is told of the progress, with a line break at the end of
-    what should stay on the screen.
+    what should stay on the screen; `checkpoints` are those of the relaxed state (`relax`).
 
     Raises `ConvergenceError`, naming the state and what to change.
     """
@@ -57,7 +59,7 @@ def reach(
 
     try:
         if not step.previous:
-            relaxed = relax(mesh, design, start, solver=solver(), report=report)
+            relaxed = relax(mesh, design, start, solver=solver(), report=report, checkpoints=checkpoints)
             return Increment(relaxed, 1, relaxed.iterations)
         return advance(
             mesh,

@@ -40,6 +40,8 @@ class Rest:
     say: Callable[[str], None]
     clock: Callable[[], float] = time.monotonic
     foreseen: Forecast | None = None
+    partly: bool = False
+    """Whether an earlier run did a part of the relaxed state, whose time then says nothing of the others."""
     since: float = field(init=False)
     """When the last state was finished, s."""
     spent: float = 0.0
@@ -63,7 +65,7 @@ class Rest:
         if loading:
             self.spent += (now - self.since) * self._busy()
             self.steps += 1
-        elif self.foreseen is not None:
+        elif self.foreseen is not None and not self.partly:
             self.pace = (now - self.since) / self.foreseen.first
         self.since = now
         self.left[loading] -= 1

@@ -18,6 +18,7 @@ from circuittex.contact.conductance import check_laws
 from circuittex.design import Design, design_hash
 from circuittex.design.contact_laws import PROVIDED
 from circuittex.geometry.weave import build_mesh
+from circuittex.mech.checkpoint import NONE, Checkpoints
 from circuittex.mech.configuration import initial_configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.mech.multifrontal import MultifrontalSolver
@@ -40,6 +41,7 @@ from circuittex.study.record import Recorded, reach
 from circuittex.study.rest import Rest
 from circuittex.study.schedule import compute
 from circuittex.study.start import chosen
+from circuittex.study.unfinished import remove_unfinished, unfinished
 
 Say = Callable[[str], None]
 Keep = Callable[[Study, Recorded], Study]
@@ -61,9 +63,9 @@ def run_study(
 
     With `out`, everything is left in that folder, which no other run can use meanwhile. The HDF5 file there grows state
     by state, netlists and VTU files are written with each, figures and report at the end. However a run ends, the same
-    call goes on from the states that are there, with the same numbers bit for bit; files that are missing are written
-    again. Results of another design or version are refused unless `fresh` has them removed; files that are not of
-    circuittex are left alone.
+    call goes on from the states that are there, with the same numbers bit for bit, and where the first relaxation is
+    long from within that (`unfinished`); files that are missing are written again. Results of another design or version
+    are refused unless `fresh` has them removed; files that are not of circuittex are left alone.
 
     The first relaxation starts from the initial weave, or as `start` says: 'tiled', from copies of the smallest cell
     that the draft repeats, relaxed before; FILE or FILE:STATE, from a stored state of a similar design, by default its
@@ -111,8 +113,8 @@ def run_study(
 
     if out is None:
         foreseen = foresee(study, count)
-        _rest(study, count, say, foreseen)
-        study = _compute(begin(study), foreseen.workers if foreseen else count, solver, say, _with)
+        _rest(study, count, say, foreseen, NONE)
+        study = _compute(begin(study), foreseen.workers if foreseen else count, solver, say, _with, NONE)
         return _examine(study, jobs(study), count, say, with_examination)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
@@ -136,19 +138,22 @@ def _in_folder(
     loading = {step.name: step.loading for step in plan(study.design)}
     if study.records:
         say(f"{len(study.records)} of {len(loading)} states are there already\n")
+        remove_unfinished(folder)
     foreseen = foreseen or foresee(study, workers)
-    rest = _rest(study, workers, say, foreseen)
+    checkpoints = NONE if study.records else unfinished(folder, study, solver().name, say)
+    rest = _rest(study, workers, say, foreseen, checkpoints)
 
     def keep(so_far: Study, recorded: Recorded) -> Study:
         record = recorded.record
         so_far = keep_record(folder, so_far, record)
+        remove_unfinished(folder)
         rest.done(loading[record.name])
         write_state(folder, so_far, record, recorded.circuits)
         write_numbers(folder, so_far)
         return so_far
 
     try:
-        study = _compute(study, foreseen.workers if foreseen else workers, solver, rest, keep)
+        study = _compute(study, foreseen.workers if foreseen else workers, solver, rest, keep, checkpoints)
         study = _examine(study, jobs(study), workers, say, partial(keep_examination, folder))
         if needs_report(folder):
             say("figures and report")
@@ -160,31 +165,36 @@ def _in_folder(
     return study
 
 
-def _rest(study: Study, workers: int, say: Say, foreseen: Forecast | None) -> Rest:
+def _rest(study: Study, workers: int, say: Say, foreseen: Forecast | None, checkpoints: Checkpoints) -> Rest:
     """What there is to do, once it has been said."""
     known, steps = {record.name for record in study.records}, plan(study.design)
     left = Counter(step.loading for step in steps if step.name not in known)
-    rest = Rest(left, len(steps), workers, say, foreseen=foreseen)
+    rest = Rest(left, len(steps), workers, say, foreseen=foreseen, partly=checkpoints.reached is not None)
     if left:
         say(f"{rest.opening()}\n")
     return rest
 
 
-def _compute(study: Study, workers: int, solver: Callable[[], LinearSolver], say: Say, keep: Keep) -> Study:
-    """The study with all its states."""
+def _compute(
+    study: Study,
+    workers: int,
+    solver: Callable[[], LinearSolver],
+    say: Say,
+    keep: Keep,
+    checkpoints: Checkpoints,
+) -> Study:
+    """The study with all its states; the relaxed one, before which nothing else can be done, goes on from what
+    `checkpoints` tell of."""
     known = {record.name for record in study.records}
     loadings = {step.loading for step in plan(study.design) if step.loading and step.name not in known}
     workers = min(workers, len(loadings))  # more would wait for one another
-    if workers <= 1:
-        return compute(study, Here(say), solver, keep)
-    pool = Pool(workers, threads=max(1, available_cores() // workers), say=say)
-    try:
+    several = workers > 1
+    pool = Pool(workers, threads=max(1, available_cores() // workers), say=say) if several else Here(say)
+    with closing(pool) as computers:
         first = {}
-        if not study.records:  # nothing else can be done yet: this process has all cores for it
-            first = {RELAXED: reach(study, plan(study.design)[0], study.initial, solver, say)}
-        return compute(study, pool, solver, keep, first)
-    finally:
-        pool.close()
+        if not study.records:  # this process has all cores for it
+            first = {RELAXED: reach(study, plan(study.design)[0], study.initial, solver, say, checkpoints)}
+        return compute(study, computers, solver, keep, first)
 
 
 def _examine(

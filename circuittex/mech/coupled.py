@@ -21,7 +21,7 @@ class Coupled:
 
     def __init__(self) -> None:
         self._pattern: Pattern | None = None
-        self.pair: Ints
+        self.pair: NDArray[np.int32]
         """(nnz,) pair of each entry of the pattern (`pair_of_entry`)."""
         self.pairs: NDArray[np.bool_]
         """whether each pair of the pattern counts."""
@@ -32,7 +32,8 @@ class Coupled:
         """Whether the pairs had to be determined anew for the matrix with these values (nnz,)."""
         new = pattern is not self._pattern
         if new:
-            self._pattern, self.pair = pattern, pair_of_entry(pattern)
+            self._pattern, self.pair = pattern, np.empty(0, dtype=np.int32)  # the old pairs go first
+            self.pair = pair_of_entry(pattern)
         pairs = np.zeros(len(pattern.neighbour), dtype=bool)
         _mark_pairs(self.pair, data, pairs)
         if not new and not np.any(pairs & ~self.pairs):
@@ -47,14 +48,14 @@ class Coupled:
         return np.searchsorted(self.entries, self._pattern.indptr)
 
 
-def pair_of_entry(pattern: Pattern) -> Ints:
+def pair_of_entry(pattern: Pattern) -> NDArray[np.int32]:
     """(nnz,) which of the pattern's node pairs each entry belongs to; -1 within a node."""
-    pair = np.empty(pattern.nnz, dtype=np.int64)
+    pair = np.empty(pattern.nnz, dtype=np.int32)
     _fill_pairs(pattern.indptr, pattern.neighbour_start, pattern.full_offset >= 0, pair)
     return pair
 
 
-def entries_of(pair: Ints, pairs: NDArray[np.bool_]) -> Ints:
+def entries_of(pair: NDArray[np.int32], pairs: NDArray[np.bool_]) -> Ints:
     """Places of the entries of these pairs, and of those within a node; `pair` (nnz,) as `pair_of_entry` gives it."""
     return np.flatnonzero(np.append(pairs, True)[pair])
 

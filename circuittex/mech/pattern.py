@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import compiled
@@ -25,8 +26,8 @@ class Pattern:
 
     indptr: Ints
     """(9 n + 1,) row starts."""
-    indices: Ints
-    """(nnz,) column numbers, sorted in each row; the diagonal comes first."""
+    indices: NDArray[np.int32]
+    """(nnz,) column numbers, sorted in each row; the diagonal comes first. In half of the memory."""
     neighbour_start: Ints
     """(n + 1,) offsets into `neighbour`."""
     neighbour: Ints
@@ -66,7 +67,7 @@ def build_pattern(n: int, full: Ints, point: Ints, position: Floats | None = Non
     full_width = np.add.reduceat(np.append(np.where(full_pair, DOFS, 0), 0), start[:-1]) * (np.diff(start) > 0)
     length = own[None, :] + np.where(np.arange(DOFS)[None, :] < 3, point_width[:, None], full_width[:, None])
     indptr = np.concatenate([[0], np.cumsum(length.ravel())])
-    indices = np.empty(indptr[-1], dtype=np.int64)
+    indices = np.empty(indptr[-1], dtype=np.int32)
     _fill_indices(indptr, start, b, full_pair, indices)
     return Pattern(
         indptr=indptr,

@@ -32,12 +32,10 @@ class System:
     n: int
     pattern: Pattern | None = None
     metric: Floats = field(default_factory=lambda: np.empty(0))
-    scaling: Floats = field(default_factory=lambda: np.empty(0))
     data: Floats = field(default_factory=lambda: np.empty(0))
     softening: Floats = field(default_factory=lambda: np.empty(0))
     forces: Floats = field(default_factory=lambda: np.empty(0))
     largest_shift: float = 0.0
-    held: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     motions: Motions | None = None
     free: NDArray[np.bool_] = field(init=False)
     """(n,) whether an unknown is not prescribed."""
@@ -56,7 +54,8 @@ class System:
     def assemble(self, q: Floats) -> tuple[Pattern, float, Floats]:
         changed = [term.prepare(q) for term in self.terms]
         if self.pattern is None or any(changed):
-            self.pattern = self._renewed(q)
+            self._renew(q)
+        assert self.pattern is not None
         gradient, self.data, self.softening = np.zeros(self.n), np.zeros(self.pattern.nnz), np.zeros(self.pattern.nnz)
         self.forces, energy = np.zeros(len(self.scales.first_node) - 1), 0.0
         for term in self.terms:
@@ -71,42 +70,38 @@ class System:
         for term in self.terms:
             term.forget()
 
-    def _renewed(self, q: Floats) -> Pattern:
+    def _renew(self, q: Floats) -> None:
+        """Pattern and metric anew. The old ones and their values go first: they are most of what there is in memory."""
+        self.pattern, self.data, self.softening, self.metric = None, np.empty(0), np.empty(0), np.empty(0)
         pairs = [term.pairs() for term in self.terms]
         full, point = (np.concatenate([p[k] for p in pairs]) for k in (0, 1))
-        pattern = build_pattern(self.n // DOFS, full, point, q.reshape(-1, DOFS)[:, :3].copy())
-        self.metric = self.scales.metric(pattern)
-        rows = np.repeat(np.arange(self.n), np.diff(pattern.indptr))
-        unit = self.scales.binary_unit
-        self.scaling = unit[rows] * unit[pattern.indices] / self.scales.energy
-        self.held = np.flatnonzero(~(self.free[rows] & self.free[pattern.indices]))
-        return pattern
+        self.pattern = build_pattern(self.n // DOFS, full, point, q.reshape(-1, DOFS)[:, :3].copy())
+        self.metric = self.scales.metric(self.pattern)
 
     def factor(self, solver: LinearSolver, shift: float, softening: float, *, rough: bool = False) -> Solve | None:
-        """The shifted tangent's factor, None where it is not positive definite; `rough` as solvers take it.
+        """The shifted tangent's factor, None where it is not positive definite; `rough` as solvers take it, where no
+        motions are eliminated after it, in which digits cancel.
 
         Its roots would be rounded otherwise at another scale, so what is factorised has no unit (`matrix`).
         """
         assert self.pattern is not None
-        solve = solver.factor(self.pattern, self.matrix(shift, softening), rough=rough)
+        solve = solver.factor(self.pattern, self.matrix(shift, softening), rough=rough and self.motions is None)
         if solve is not None and self.motions is not None:  # of positions alone: in these units they are what they were
-            whole = self._whole(shift, softening), self.pattern.indices, self.pattern.indptr
+            everything = np.ones(self.n, dtype=bool)
+            whole = self._among(everything, shift, softening), self.pattern.indices, self.pattern.indptr
             solve = self.motions.solve(solve, sp.csr_array(whole, shape=(self.n, self.n)), self.free)
         unit, energy = self.scales.binary_unit, self.scales.energy
         return None if solve is None else lambda force: unit * solve(unit * force / energy)
 
     def matrix(self, shift: float, softening: float) -> Floats:
         """(nnz,) the shifted tangent, without a unit, of the free unknowns; ones for the others."""
-        assert self.pattern is not None
-        values = self._whole(shift, softening)
-        values[self.held] = 0.0
-        values[diagonal(self.pattern)[self.fixed]] = 1.0
-        return values
+        return self._among(self.free, shift, softening)
 
-    def _whole(self, shift: float, softening: float) -> Floats:
+    def _among(self, free: NDArray[np.bool_], shift: float, softening: float) -> Floats:
         assert self.pattern is not None
         values = np.empty(self.pattern.nnz)
-        _shifted(self.data, softening, self.softening, shift, self.metric, self.scaling, values)
+        places = self.pattern.indptr, self.pattern.indices, free, self.scales.binary_unit, self.scales.energy
+        _shifted(*places, self.data, softening, self.softening, shift, self.metric, values)
         return values
 
     def limits(self, q: Floats, tolerance: float, force_tolerance: float) -> Floats:
@@ -134,7 +129,27 @@ class System:
 
 
 @compiled
-def _shifted(data: Any, fraction: float, softening: Any, shift: float, metric: Any, scaling: Any, values: Any) -> None:
-    """Fill values (nnz,) with (data + fraction softening + shift metric) scaling."""
-    for k in range(values.shape[0]):
-        values[k] = (data[k] + fraction * softening[k] + shift * metric[k]) * scaling[k]
+def _shifted(
+    indptr: Any,
+    indices: Any,
+    free: Any,
+    unit: Any,
+    energy: float,
+    data: Any,
+    fraction: float,
+    softening: Any,
+    shift: float,
+    metric: Any,
+    values: Any,
+) -> None:
+    """Fill values (nnz,) with (data + fraction softening + shift metric) unit unit' / energy among what is free.
+
+    Units are powers of two, of which nothing is rounded. What is not free is coupled to nothing and has ones.
+    """
+    for i in range(free.shape[0]):
+        for k in range(indptr[i], indptr[i + 1]):
+            j = indices[k]
+            if free[i] and free[j]:
+                values[k] = (data[k] + fraction * softening[k] + shift * metric[k]) * (unit[i] * unit[j] / energy)
+            else:
+                values[k] = 1.0 if i == j else 0.0

@@ -62,7 +62,7 @@ def analysed(matrix: sp.sparray, position: Floats | None = None) -> tuple[Analys
     graph.eliminate_zeros()
     graph.data[:] = 1.0
     blocks = Blocks(graph, np.arange(n), np.ones(n, dtype=np.int64), levels(graph) if position is None else position)
-    entries = Entries(upper.indptr.astype(np.int64), upper.indices.astype(np.int64), np.arange(upper.nnz))
+    entries = Entries(upper.indptr.astype(np.int64), upper.indices.astype(np.int32), np.arange(upper.nnz))
     return analyse(blocks, entries), upper.data
 
 
@@ -76,10 +76,11 @@ class Cholesky:
     def __init__(self, analysis: Analysis, last: Cholesky | None = None, *, single: bool = False) -> None:
         self.analysis, self.single = analysis, single
         self._libraries: ThreadpoolController = ThreadpoolController() if last is None else last._libraries
-        self._room: NDArray[np.uint8] = np.empty(0, dtype=np.uint8) if last is None else last._room
+        self._room: NDArray[np.uint8] = np.empty(0, dtype=np.uint8) if last is None else last._hand_on()
         dtype = np.dtype(np.float32 if single else np.float64)
         size = dtype.itemsize * analysis.size
         if len(self._room) < size:
+            self._room = np.empty(0, dtype=np.uint8)  # the old one goes first
             self._room = np.empty(int(SPARE * analysis.size) * dtype.itemsize, dtype=np.uint8)
         self._values: Reals = self._room[:size].view(dtype)
         self._dense = [
@@ -89,6 +90,11 @@ class Cholesky:
         ]
         """Each front with the values of its triangle and its border."""
         self._subtrees = [np.arange(each.start, each.stop) for each in analysis.subtrees]
+
+    def _hand_on(self) -> NDArray[np.uint8]:
+        """The memory, with nothing here that refers to it any more."""
+        room, self._room, self._values, self._dense = self._room, np.empty(0, dtype=np.uint8), np.empty(0), []
+        return room
 
     def factor(self, values: Floats) -> Solve | None:
         """A function that solves with the matrix (until the next call), or None if a pivot is not positive.

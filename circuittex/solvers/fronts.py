@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import compiled
@@ -112,7 +113,7 @@ class Entries:
 
     indptr: Ints
     """(n_dofs + 1,) where rows begin."""
-    indices: Ints
+    indices: NDArray[np.int32]
     """column of each place; of the two places of a pair of unknowns one is used."""
     used: Ints
     """the places that count, rising."""

@@ -19,7 +19,7 @@ from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import DOFS, Pattern
 from circuittex.mech.scales import fibril_scales
 from circuittex.mech.system import System
-from circuittex.relaxation.relax import Equilibrium, force_terms, relax
+from circuittex.relaxation.relax import Equilibrium, force_terms, move, relax
 
 TIGHT = 1e-9
 """N; clamp forces are some 0.1 N."""
@@ -136,6 +136,23 @@ def test_newtons_method_confirms_the_minimum_that_it_would_have_found_itself(mon
     assert found.iterations > len(found.history) - 1  # some were by gradients
     assert np.abs(found.configuration.r - alone.configuration.r).max() < 1e-6
     assert found.energy == pytest.approx(alone.energy, rel=1e-9)
+
+
+def test_a_step_of_a_path_ends_where_newtons_method_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the forces left over stiffness again; and the last step, with the factor that shows the minimum to be one,
+    leaves a hundred times less than the descent does, where its limits are wide: it is Newton's but for the shift."""
+    design, mesh = small_cell((1,), yarns=1, tolerance="1e-4 N")
+    rest = relax(mesh, design)
+    stretched = np.diag([1.02, 1.0])
+    moved = move(rest.configuration, np.eye(2), stretched)
+    tight = replace(design, numerics=replace(design.numerics, tolerance=f"{TIGHT} N"))
+    alone = relax(mesh, tight, moved, before=rest.configuration, gradient=stretched)
+    with_descent(monkeypatch)
+    found = relax(mesh, design, moved, before=rest.configuration, gradient=stretched)
+    assert len(found.history) == 1  # all by gradients
+    assert found.iterations > 2
+    assert found.residual < 1e-2 * found.history[-1][0] < 1e-2 * 1e-4
+    assert np.abs(found.reaction - alone.reaction).max() < 1e-6
 
 
 def relaxed(s: float, m: float) -> tuple[Design, FibrilMesh, Equilibrium]:

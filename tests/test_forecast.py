@@ -26,12 +26,20 @@ from circuittex.design import Design, plain_weave
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import initial_configuration
-from circuittex.mech.pattern import DOFS, Pattern
+from circuittex.mech.pattern import DOFS
 from circuittex.mech.system import System
 from circuittex.relaxation.cost import Cost, Size, measured_cost
 from circuittex.relaxation.relax import WORTH_A_DESCENT, relax
 from circuittex.solvers.cholesky import Cholesky
-from circuittex.study.forecast import Forecast, expected_iterations, first_seconds, forecast, foresee, memory_of
+from circuittex.study.forecast import (
+    Forecast,
+    expected_iterations,
+    first_seconds,
+    forecast,
+    foresee,
+    memory_of,
+    step_seconds,
+)
 from circuittex.study.rest import ENOUGH, Rest
 from circuittex.study.run import run_study
 
@@ -66,18 +74,18 @@ def test_sizes_are_those_of_the_relaxation_itself(
     design, mesh, cost = cell
     entries: list[int] = []
     held: list[int] = []
-    renewed, factor = System._renewed, Cholesky.factor
+    renew, factor = System._renew, Cholesky.factor
 
-    def watched(self: System, q: Floats) -> Pattern:
-        pattern = renewed(self, q)
-        entries.append(pattern.nnz)
-        return pattern
+    def watched(self: System, q: Floats) -> None:
+        renew(self, q)
+        assert self.pattern is not None
+        entries.append(self.pattern.nnz)
 
     def watched_factor(self: Cholesky, values: Floats) -> cholesky.Solve | None:
         held.append(len(self._values))
         return factor(self, values)
 
-    monkeypatch.setattr(System, "_renewed", watched)
+    monkeypatch.setattr(System, "_renew", watched)
     monkeypatch.setattr(Cholesky, "factor", watched_factor)
     relax(mesh, design)
     assert cost.size == (mesh.n_nodes, entries[0], held[0])
@@ -161,6 +169,16 @@ def test_a_descent_by_gradients_counts_where_there_is_one() -> None:
     assert first_seconds(dear) > first_seconds(cost)
     cost = made_up(1000)
     assert first_seconds(replace(cost, gradient=9.0)) == first_seconds(cost)
+
+
+def test_so_does_one_of_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From half as many unknowns on; there an iteration costs a gradient and a solution in place of all parts."""
+    cost = made_up(WORTH_A_DESCENT // 2 // DOFS + 1)
+    dear = replace(cost, gradient=2 * cost.gradient)
+    assert first_seconds(dear) == first_seconds(cost)
+    assert step_seconds(dear, 100) - step_seconds(cost, 100) == pytest.approx(100 * cost.gradient)
+    small = made_up(1000)
+    assert step_seconds(replace(small, gradient=9.0), 10) == step_seconds(small, 10)
 
 
 def test_workers_share_cores_and_add_memory(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -37,6 +37,8 @@ SOFTENING, SHIFT, LESS, LARGEST_SHIFT = 0.3, 0.1, 1 / 16, 1e3
 later ones are tried from `LESS` times the one that served last on, since a factor that fails costs nearly as much.
 The largest is in parts of the largest stiffness of an unknown over its metric, as Newton's is. In single precision:
 what the pairs correct need not be better."""
+NEAR = 25.0
+"""The shift that is tried first by a descent that began with a factor: smaller ones are refused at most places."""
 ARMIJO, TRIALS = 1e-4, 10
 """A step must achieve this part of the decrease that the slope promises, shortened at most so many times."""
 LEAST_CUT = 0.1
@@ -51,6 +53,7 @@ def descend(
     system: System,
     solver: LinearSolver,
     q: Floats,
+    solve: Solve | None = None,
     *,
     stride: float,
     limits: tuple[float, float],
@@ -61,14 +64,18 @@ def descend(
 
     The descent ends where each fibril's free force is below what `System.limits` makes of the two tolerances `limits`,
     where no step lowers the potential any more, or where one would press fibrils through one another: Newton's method
-    has the last word on all of these. No step moves a node by more than `stride`, mm.
+    has the last word on all of these. No step moves a node by more than `stride`, mm. It begins with the factor
+    `solve` of the tangent assembled last, near q, if there is one.
 
     Where `checkpoints` tell of a place that was reached, it goes on from there in place of q, and takes the steps that
     it would have taken, to the last bit.
     """
     scales = system.scales
     pairs: Pairs = deque(maxlen=REMEMBERED)
-    solve, shift, age, most, begun = None, SHIFT, 0, stride, 0
+    shift, age, most, begun = SHIFT, 0, stride, 0
+    if solve is not None:
+        energy, gradient = system.slope(q)
+        shift, allowed = NEAR / LESS, system.limits(q, *limits)
     reached = checkpoints.reached
     if reached is not None:
         if reached.ended:
@@ -121,6 +128,19 @@ def hand_over(system: System, solver: LinearSolver, q: Floats, iterations: int, 
     known = checkpoints.reached is not None and checkpoints.reached.ended
     if checkpoints.keep is not None and not known:
         checkpoints.keep(_checkpoint(q, deque(), SHIFT, 0.0, iterations, ended=True))
+
+
+def refined(system: System, solve: Solve, q: Floats, energy: float, gradient: Floats) -> tuple[Floats, float, Floats]:
+    """Unknowns, potential and gradient after one step of Newton's method more from the end q of a descent, where that
+    leaves less force: a descent ends just below its limits, and the factor that shows q to be a minimum is at hand."""
+    force = system.free_force(gradient)
+    direction = -solve(force)
+    if system.longest(q, direction) < 1.0:
+        return q, energy, gradient
+    lower, less = system.slope(q + direction)
+    if system.scales.forces(system.free_force(less)).max() >= system.scales.forces(force).max():
+        return q, energy, gradient
+    return q + direction, lower, less
 
 
 def begin_anew(system: System, solver: LinearSolver) -> None:

@@ -18,7 +18,7 @@ from circuittex.base.arrays import Floats, Ints
 from circuittex.base.errors import ConvergenceError, CreepingError, PenetrationError
 from circuittex.base.frozen import frozen
 from circuittex.mech.checkpoint import NONE, Checkpoints
-from circuittex.mech.descent import descend, hand_over
+from circuittex.mech.descent import descend, hand_over, refined
 from circuittex.mech.linear import LinearSolver, Solve
 from circuittex.mech.motions import Motions
 from circuittex.mech.pattern import Pattern, diagonal, multiply
@@ -115,13 +115,16 @@ def minimise(
     `PenetrationError` where a term cannot keep apart what it should.
     """
     system = System(terms, scales, fixed, len(q), motions=motions)
+    known: Solve | None = None
     if before is not None:
-        q = predict(system, solver, before, q)
+        q, known = predict(system, solver, before, q)
     shift, place, refused, step, history = FIRST_SHIFT, 0, False, 1.0, []
     cheap = 0
     if stride > 0.0:
         bounds = tolerance, force_tolerance
-        q, cheap = descend(system, solver, q, stride=stride, limits=bounds, report=report, checkpoints=checkpoints)
+        q, cheap = descend(
+            system, solver, q, known, stride=stride, limits=bounds, report=report, checkpoints=checkpoints
+        )
         if before is None:
             hand_over(system, solver, q, cheap, checkpoints)
     for iteration in range(max_iterations + 1):
@@ -138,8 +141,12 @@ def minimise(
         if not np.isfinite(energy):
             raise ConvergenceError("the potential is infinite: a fibril's section is inside out", np.array(history))
         balanced = bool((left <= limits).all())
-        if balanced and system.factor(solver, FIRST_SHIFT, 1.0) is not None:
+        solution = system.factor(solver, FIRST_SHIFT, 1.0) if balanced else None
+        if solution is not None:
             solves = cheap + iteration + (before is not None)
+            if cheap > 0 and iteration == 0:
+                q, energy, gradient = refined(system, solution, q, energy, gradient)
+                residual = float(scales.forces(system.free_force(gradient)).max())
             return Minimum(q, gradient, energy, residual, solves, np.array(history))
         short, last = sum(row[3] <= SHORT for row in history), iteration == max_iterations
         if not may_creep and short >= (1 if last else CREEPING):
@@ -178,8 +185,9 @@ def minimise(
     raise ConvergenceError(f"no equilibrium after {len(history) - 1} iterations: {trouble}", np.array(history))
 
 
-def predict(system: System, solver: LinearSolver, q: Floats, moved: Floats) -> Floats:
-    """Where a minimum q (n_dofs,) goes to first order when its prescribed unknowns move to those of `moved`.
+def predict(system: System, solver: LinearSolver, q: Floats, moved: Floats) -> tuple[Floats, Solve | None]:
+    """Where a minimum q (n_dofs,) goes to first order when its prescribed unknowns move to those of `moved`; and the
+    factor of its tangent, None where that is not positive definite.
 
     With the tangent K at q and the free unknowns f, the minimum moves by dq with (K dq)_f = 0; this is solved for the
     difference to `moved`, a first guess. `moved` itself is returned where its potential is the lower one, or where the
@@ -193,10 +201,10 @@ def predict(system: System, solver: LinearSolver, q: Floats, moved: Floats) -> F
     force = system.free_force(multiply(pattern, system.data + system.softening, moved - q))
     solve = system.factor(solver, FIRST_SHIFT, 1.0)
     if solve is None:
-        return moved
+        return moved, None
     predicted = moved - solve(force)
     lower = system.energy(predicted) < system.energy(moved)
-    return predicted if lower and system.longest(q, predicted - q) == 1.0 else moved
+    return (predicted if lower and system.longest(q, predicted - q) == 1.0 else moved), solve
 
 
 def _positive(

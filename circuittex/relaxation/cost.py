@@ -47,7 +47,7 @@ class Cost:
     factorisation: float
     """s for the factor's values."""
     gradient: float
-    """s for a gradient alone, its contacts searched before; 0 where no descent by gradients comes first."""
+    """s for a gradient alone, its contacts searched before; 0 where nothing is descended by gradients."""
     solution: float
     """s for a solution with the factor."""
 
@@ -105,7 +105,7 @@ def measured_cost(
         solve(gradient)
     solved = clock()
     gradient_in = 0.0
-    if begins_with_gradients(space.n_dofs):
+    if begins_with_gradients(space.n_dofs, step=True):
         system.slope(q)  # with a search
         clock()
         system.slope(q)

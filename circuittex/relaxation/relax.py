@@ -58,9 +58,12 @@ class Equilibrium:
     """(Newton iterations + 1, 4) residual N, potential N mm, shift (`minimise`), step length, of the last descent."""
 
 
-def begins_with_gradients(n_dofs: int) -> bool:
-    """Whether a first relaxation of so many unknowns begins with a descent by gradients."""
-    return n_dofs >= WORTH_A_DESCENT
+def begins_with_gradients(n_dofs: int, *, step: bool = False) -> bool:
+    """Whether a relaxation of so many unknowns begins with a descent by gradients: the first, or a `step` of a path.
+
+    A step has a factor to begin with, so that half as many make it worth while.
+    """
+    return n_dofs >= (WORTH_A_DESCENT // 2 if step else WORTH_A_DESCENT)
 
 
 def force_terms(mesh: FibrilMesh, design: Design, free_edges: str = "") -> tuple[BeamSpace, Beam, PenaltyContact]:
@@ -151,7 +154,7 @@ def _relaxed(
     scales = fibril_scales(space, design.weave.least_pitch, largest_penalty(mesh, design.contact))
     scales = replace(scales, newtons=units.force)
 
-    large = before is None and begins_with_gradients(space.n_dofs)
+    large = begins_with_gradients(space.n_dofs, step=before is not None)
     stride = float(mesh.radius.min()) if large else 0.0
 
     def descend(q: Floats, part: float, may_creep: bool) -> Minimum:

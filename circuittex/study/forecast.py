@@ -31,7 +31,9 @@ STEP = 1 / 3
 """Iterations of a step of a loading path in parts of those."""
 GRADIENTS, BESIDE = 400, 10
 """Iterations by gradients, and what factorisations and Newton's method take beside them in iterations of the latter,
-where a descent comes first: 423 and 414 of them were counted."""
+where a descent comes first: 315 to 600 of them were counted."""
+STEP_GRADIENTS, STEP_BESIDE = 120, 5
+"""The same for a step of a loading path: 58 to 224 of them were counted."""
 TRIED = 1.2
 """What an iteration takes, in parts of one of each of its parts at the start: several factors may be tried, steps are
 searched, and contacts come. 0.6 to 2 were measured."""
@@ -95,10 +97,10 @@ def foresee(study: Study, workers: int) -> Forecast | None:
     admit(Size(mesh.n_nodes, LEAST_ENTRIES * mesh.n_nodes, 0))
     first = expected_iterations(DOFS * mesh.n_nodes)
     taken = [record.iterations for record in study.records if record.loading]
-    each = sum(taken) / len(taken) if taken else STEP * first
+    each = sum(taken) / len(taken) if taken else step_iterations(DOFS * mesh.n_nodes)
     paths = len({step.loading for step in steps if step.loading})
     count = len(steps) if known else len(steps) - 1
-    nominal = (0.0 if known else first + RECORD) + count * (each + RECORD)
+    nominal = (0.0 if known else first + RECORD) + count * (STEP * first + RECORD)
     if NOMINAL * DOFS * mesh.n_nodes * nominal < MOMENTS:
         return None
     tiny = plain_weave(yarns=1, rows=(1,))
@@ -122,7 +124,7 @@ def forecast(cost: Cost, relaxed: bool, each: float, workers: int, available: in
     slower = (available_cores() / threads) ** SHARED
     return Forecast(
         first=first_seconds(cost) + RECORD * cost.iteration if relaxed else 0.0,
-        step=slower * (TRIED * each + RECORD) * cost.iteration,
+        step=slower * (step_seconds(cost, each) + RECORD * cost.iteration),
         workers=workers,
         memory=workers * one + PROCESS if workers > 1 else one,
     )
@@ -135,6 +137,23 @@ def expected_iterations(unknowns: int) -> float:
     [20, 40, 79, 157]
     """
     return FIRST * sqrt(unknowns / OF_UNKNOWNS)
+
+
+def step_iterations(unknowns: int) -> float:
+    """Iterations that a step of a loading path is expected to take, by gradients where it begins with these.
+
+    >>> [round(step_iterations(n)) for n in (7560, 29520)]
+    [7, 120]
+    """
+    by_gradients = begins_with_gradients(unknowns, step=True)
+    return STEP_GRADIENTS if by_gradients else STEP * expected_iterations(unknowns)
+
+
+def step_seconds(cost: Cost, iterations: float) -> float:
+    """What a step of a loading path takes in so many iterations, s."""
+    if begins_with_gradients(DOFS * cost.size.nodes, step=True):
+        return iterations * (cost.gradient + cost.solution) + STEP_BESIDE * TRIED * cost.iteration
+    return TRIED * iterations * cost.iteration
 
 
 def first_seconds(cost: Cost) -> float:

@@ -83,5 +83,5 @@ def stretched() -> Comparison:
         ),
         meaning="The crimp is pulled out before the metal is stretched: less comes of it than the 2 of a wire, and less still where the warp waves more. "
         "That leaves the second stage: once straight, a yarn that waved more has been stretched less, and its gauge factor, 2 (1 + strain) / (1 + crimp)^2, is smaller, not larger. "
-        "What makes theirs larger is within their yarns, not in the weave's geometry.",
+        "What makes theirs larger is within their yarns, not in the weave's geometry. More warps go their way in that stage by less than a hundredth, which says little.",
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+from math import pi
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,6 +15,9 @@ FOLDER = Path(__file__).parents[1] / "validation"
 PAGE = (FOLDER.parent / "docs" / "validation.md").read_text(encoding="utf-8")
 OTHER_MACHINES = 0.005
 """Relative: three digits are printed, and no relaxation is behind those that are computed here."""
+
+ROUNDING = 1e-12
+"""Relative: sums of a few products."""
 
 
 @pytest.fixture
@@ -28,7 +32,9 @@ def numbers(text: str) -> list[float]:
 
 def test_the_page_has_what_is_computed(script: Any) -> None:
     """Those that take no relaxation, all of them again; words are the same, and numbers within what is printed."""
-    found = [script("wires").compare(), script("rods").steel(), *script("rods").compare()]
+    rods = script("rods")
+    found = [script("wires").compare(), rods.steel(), rods.brush(), rods.steel_rods(), *rods.compare()]
+    found += [script("carbon").laminate()]
     for comparison in found:
         mine = comparison.text().strip()
         start = PAGE.index(f"## {comparison.title}\n")
@@ -58,6 +64,23 @@ def test_an_input_without_a_source_needs_a_reason(script: Any) -> None:
     for given in (comparison.Input("E", "1", None), comparison.Input("E", "1", other)):
         with pytest.raises(ValueError, match="source"):
             comparison.Comparison(**made, sources=(known,), inputs=(given,), points=())
+
+
+def test_a_bundle_stretches_bends_and_conducts_as_its_filaments(script: Any) -> None:
+    """72 free filaments of 27 um as one fibril of 0.115 mm: sums over the 72, and what the skin adds."""
+    n, r, R, E, skin = 72, 0.0135, 0.0575, 4e3, 1e3
+    one = pi * r**2
+    yarn = script("bundle").bundle("yarn", 2 * R, n * one, E, r, skin, conductance=n * one * 50.0)
+    (fibril,), (bent,) = yarn.fibrils, yarn.bending_radii
+    stretched = fibril.youngs_modulus * pi * R**2
+    assert stretched == pytest.approx(n * E * one, rel=ROUNDING)
+    assert fibril.electrical_conductivity * pi * R**2 == pytest.approx(n * 50.0 * one, rel=ROUNDING)
+    # the core has what the skin lacks of E A, so of E I too; the skin is a tube
+    free = n * E * pi * r**4 / 4
+    tube = skin * pi * (R**4 - r**4) / 4
+    lacks = skin * pi * (R**2 - r**2) * r**2 / 4
+    assert stretched * bent**2 / 4 == pytest.approx(free + tube - lacks, rel=ROUNDING)
+    assert tube > 0.5 * free, "the skin is seen at all"
 
 
 def test_heat_to_the_air_is_as_textbooks_tabulate(script: Any) -> None:

@@ -1,4 +1,4 @@
-"""Woven fabrics: sheets, a stretched sensor, a heater, a screen's thickness."""
+"""Woven fabrics at rest: sheets, a heater, a screen's thickness."""
 
 # ruff: noqa: E501 (sentences of the page)
 from __future__ import annotations
@@ -21,28 +21,10 @@ TOKARSKA = Source(
     "resulted in a 13-15 % reduction in resistance', by van der Pauw",
     "https://doi.org/10.3390/ma18112456",
 )
-SENSOR = Source(
-    "SN Appl. Sci.",
-    "SN Applied Sciences 2 (2020), abstract: along the warp of a fabric woven of conductive yarns the gauge factor is below 2 "
-    "at elastic strain, and not linear",
-    "https://doi.org/10.1007/s42452-019-1857-6",
-)
 SCREEN = Source(
     "Screen Web",
     "'Mesh matters' (2009): 'a 305-thread/in. fabric with 40-micron thread diameter might have a total thickness of 63 microns'",
     "http://screenweb.com/content/mesh-matters?page=0%2C3",
-)
-ARAMID = Source(
-    "ICF13",
-    "13th International Conference on Fracture (2013), fabric of Kevlar 49 under uniaxial tension: 'the maximum strain in crimp region in warp and fill "
-    "directions is only 0.0065 mm/mm and 0.0025 mm/mm', 'fully straightened (0.01 to 0.02)', Young's modulus 120 GPa with a standard deviation of 14",
-    "http://icfweb.org/Proceedings/ICF13B/386",
-)
-ZHU = Source(
-    "Zhu",
-    "D. Zhu, B. Mobasher, A. Vaidya, S. D. Rajan, Compos. Sci. Technol. 74 (2013) 121, the same fabric: plain, 17 x 17 yarns an inch, 0.28 mm thick, "
-    "0.115 mm2 of fibres in a yarn (from memory, not read again)",
-    "https://bvbvf1.bib-bvb.de/vufind/PrimoRecord/cdi_proquest_miscellaneous_1349472827",
 )
 PAD = Source(
     "Arduino forum",
@@ -107,83 +89,6 @@ def sheets() -> Comparison:
         unit="per cent less",
         points=(Point("resistance, %", Band(13.0, 15.0), Band(less[0], less[1])),),
         meaning="The crimp that more wefts give the warp is in it. No current crosses contacts in a weave of equal yarns.",
-    )
-
-
-def sensor() -> Comparison:
-    stretch, found = 0.01, []
-    for conduction in ("reference", "current"):
-        loading = [{"name": "stretch", "kind": "uniaxial", "axis": "x", "strain": stretch, "steps": 1}]
-        study = ct.run_study(
-            silver([10.0, 10.0], electrical={"conduction": conduction, "fit": "all-pairs"}, loading=loading)
-        )
-        rest, stretched = (1 / float(record.currents[0]) for record in study.records)
-        found.append((stretched / rest - 1) / stretch)
-    return Comparison(
-        title="The resistance of a woven sensor along a stretched yarn",
-        measured="Gauge factor, (change of resistance) / strain, along the warp.",
-        sources=(SENSOR, THREAD),
-        inputs=(
-            Input("strain", "1 %", None, "elastic"),
-            Input("yarns, 10 a cm", "three filaments of silver-plated nylon", THREAD),
-            Input(
-                "conductivity",
-                "constant in the unstretched or in the stretched metal",
-                None,
-                "the two laws there are; a plating cracks between",
-            ),
-        ),
-        computed="One warp end to the other of a cell whose yarns are as long as their path, stretched by 1 % with ends held.",
-        unit="gauge factor",
-        points=(Point("warp", Band(0.0, 2.0), Band(min(found), max(found))),),
-        meaning="The crimp is pulled out before the metal is stretched, so that less comes of it than the 2 of a wire.",
-    )
-
-
-def aramid() -> Comparison:
-    pitch, R, n = 25.4 / 17, 0.28 / 4, 7  # seven fibrils side by side: 0.108 mm2, two yarns on one another 0.28 mm
-    fibre = ct.Material("aramid", 120e3, 0.3, 1.44e-3, 0.0, 4e-5)
-    yarn = ct.Yarn("yarn", (n,), R, 2 * R, 2 * R, (fibre,) * n, crimp="path", heat_set=1.0)
-    weave = ct.Weave(((0, 1), (1, 0)), (yarn,) * 2, (yarn,) * 2, pitch=pitch, amplitude=R)
-    pull = ct.uniaxial("pull", ct.equal_steps(0.015, 15), "x", "y")
-    study = ct.run_study(
-        ct.Design("aramid", weave, ct.ContactLaw("hertz", 0.0, 0.0), (pull,), numerics=ct.Numerics(elements=40))
-    )
-    strain = np.array([record.strain for record in study.records[1:]])
-    force = np.array([record.clamp_force[0, 0] / 2 for record in study.records[1:]])
-    slope = (force[-1] - force[-3]) / (strain[-1] - strain[-3])
-    offset = 100 * (strain[-1] - force[-1] / slope)
-    half = 100 * float(np.interp(slope / 2, np.gradient(force, strain), strain))
-    part = np.gradient(force, strain) / slope
-    straight = 100 * float(np.interp(0.9, part, strain))
-    return Comparison(
-        title="Force against strain of a plain weave",
-        measured="Aramid fabric under uniaxial tension, wefts free: where the crimp is pulled out and where the yarns are straight.",
-        sources=(ARAMID, ZHU),
-        inputs=(
-            Input("yarns an inch, thickness, section of a yarn", "17, 0.28 mm, 0.115 mm2", ZHU),
-            Input("modulus", "120 GPa", ARAMID),
-            Input(
-                "yarns",
-                "seven fibrils side by side, 0.108 mm2",
-                None,
-                "some hundred filaments of 12 um are too many here: these bend a hundred times stiffer",
-            ),
-            Input("natural shape", "as woven", None, "filaments so thin are bent by hardly any force"),
-        ),
-        computed="A cell of 2 x 2 yarns with free weft ends, pulled to 1.5 %. The crimp ends between the strain where the tangent is half "
-        "of the last one and the one from which the last tangent starts; 'straight' is where the tangent is 0.9 of the last.",
-        unit="per cent",
-        points=(
-            Point(
-                "strain where the crimp ends, weft and warp",
-                Band(0.25, 0.65),
-                Band(min(offset, half), max(offset, half)),
-            ),
-            Point("strain where the yarns are straight", Band(1.0, 2.0), Band(straight, straight)),
-        ),
-        meaning="Peirce's crimp for waves of half the thickness is (3/4 x 0.14 mm / pitch)^2, 0.5 %. In the crimp region itself the cell is "
-        "stiffer than the fabric, for its fibrils bend stiffer.",
     )
 
 

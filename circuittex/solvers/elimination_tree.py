@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import compiled
@@ -29,7 +30,7 @@ class EliminationTree(NamedTuple):
     """the block of each turn."""
     begin: Ints
     """where in `later` those of each block begin."""
-    later: Ints
+    later: NDArray[np.int32]
     """the later blocks to which each is coupled when its turn comes."""
     tops: Ints
     """the block that gives each front its border."""
@@ -45,28 +46,30 @@ def elimination_tree(graph: sp.csr_array, width: Ints, blocks: Ints) -> Eliminat
     n, width = len(blocks), width[blocks]
     begin = np.zeros(n + 1, dtype=np.int64)
     later = _eliminate(turned.indptr.astype(np.int64), turned.indices.astype(np.int64), begin)
+    border = np.empty(n)
+    _widths(begin, later, width, border)
     some = np.diff(begin) > 0
     above = np.full(n, -1)
     above[some] = np.minimum.reduceat(later, begin[:-1][some])
-    p, b = width.astype(float), np.diff(np.concatenate([[0], np.cumsum(width[later])])[begin]).astype(float)
-    taken, tops = _take_in(above, p, b, FRONT, ADDITION)
+    p = width.astype(float)
+    taken, tops = _take_in(above, p, border, FRONT, ADDITION)
     front = np.empty(n, dtype=np.int64)
     front[tops] = np.arange(len(tops))
     for c in np.flatnonzero(taken != np.arange(n))[::-1]:  # what takes a block in comes after it
         front[c] = front[taken[c]]
-    return EliminationTree(blocks, begin, later, tops, front, float(operations_of(p[tops], b[tops]).sum()))
+    return EliminationTree(blocks, begin, later, tops, front, float(operations_of(p[tops], border[tops]).sum()))
 
 
 @compiled
 def _eliminate(indptr: Any, indices: Any, begin: Any) -> Any:
     """Eliminate block after block: what is coupled to one comes to be coupled to the next of these."""
     n = len(indptr) - 1
-    later, seen = np.empty(4 * len(indices), np.int64), np.full(n, -1)
+    later, seen = np.empty(4 * len(indices), np.int32), np.full(n, -1)
     below, sibling = np.full(n, -1), np.full(n, -1)  # the blocks whose next one is this: a linked list
     end = 0
     for k in range(n):
         if end + n > len(later):
-            longer = np.empty(2 * (end + n), np.int64)
+            longer = np.empty(2 * (end + n), np.int32)
             longer[:end] = later[:end]
             later = longer
         seen[k], nearest = k, n
@@ -85,6 +88,15 @@ def _eliminate(indptr: Any, indices: Any, begin: Any) -> Any:
         if nearest < n:
             sibling[k], below[nearest] = below[nearest], k
     return later[:end]
+
+
+@compiled
+def _widths(begin: Any, later: Any, width: Any, border: Any) -> None:
+    """Fill border (n,) with the unknowns of the later blocks to which each is coupled."""
+    for k in range(border.shape[0]):
+        border[k] = 0.0
+        for at in range(begin[k], begin[k + 1]):
+            border[k] += width[later[at]]
 
 
 @compiled

@@ -210,6 +210,7 @@ def _ordered(blocks: Blocks, last: Analysis | None) -> tuple[EliminationTree, fl
         tree = elimination_tree(graph, width, last.blocks)
         if tree.operations <= WORTHWHILE * last.least:
             return tree, last.least
+        del tree  # a bad order has many couplings
     tree = elimination_tree(graph, width, dissect(graph, width, blocks.position))
     return tree, tree.operations
 

@@ -80,9 +80,7 @@ def coated(design: Design) -> Design:
     kind: Yarn = design.weave.warp[0]
     shell = replace(kind.materials[0], name="shell", electrical_conductivity=500.0)
     core = replace(kind.materials[0], name="core", electrical_conductivity=0.0)
-    return yarn(
-        design, materials=(core,) * kind.n_fibrils, shell=shell, shell_thickness=0.01 * kind.radius
-    )
+    return yarn(design, materials=(core,) * kind.n_fibrils, shell=shell, shell_thickness=0.01 * kind.radius)
 
 
 def heated(**keys: Any) -> Callable[[Design], Design]:
@@ -99,9 +97,7 @@ def heated(**keys: Any) -> Callable[[Design], Design]:
 
 def driven(**by: float) -> Callable[[Design], Design]:
     """Probes that are driven otherwise than by a voltage."""
-    return lambda design: replace(
-        design, probes=tuple(replace(probe, voltage=0.0, **by) for probe in design.probes)
-    )
+    return lambda design: replace(design, probes=tuple(replace(probe, voltage=0.0, **by) for probe in design.probes))
 
 
 MECHANICAL: Mapping[str, Callable[[Design], Design]] = {
@@ -195,7 +191,9 @@ def mechanics(ask: Asked, names: Sequence[str], rounds: int, repeats: int) -> Ta
         rows.append([*row, ratio(assembly[part][0], assembly[OFF][0])])
     head = ["part", "iterations", "processor s", "of off", "iterations of a step", "processor s", "of off"]
     return Table(
-        "Parts of the mechanics: a first relaxation, a step of 2.5 % and an assembly:", [*head, "assembly, of off"], rows
+        "Parts of the mechanics: a first relaxation, a step of 2.5 % and an assembly:",
+        [*head, "assembly, of off"],
+        rows,
     )
 
 
@@ -238,7 +236,9 @@ def off(before: Asked, now: Asked, rounds: int, repeats: int) -> Table:
 def main() -> None:
     parser = arguments(__doc__)
     parser.add_argument("--before", type=Path, metavar="FOLDER", help="a checkout of an older version to compare with")
-    parser.add_argument("--parts", nargs="+", metavar="WORD", default=[""], help="parts with one of these in their names")
+    parser.add_argument(
+        "--parts", nargs="+", metavar="WORD", default=[""], help="parts with one of these in their names"
+    )
     parser.add_argument("--rounds", type=int, help="of first relaxations and steps (default: 1, with --before 3)")
     parser.add_argument("--repeats", type=int, help="of what takes less (default: 5, with --before 11)")
     options = parser.parse_args()

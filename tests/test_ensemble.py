@@ -5,11 +5,9 @@ Members are computed in this process, most of them by a stand-in; `test_ensemble
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import json
 import warnings
-from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,6 +18,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from members_here import compute_here
 
 import circuittex.study.ensemble.run as run_module
 from circuittex.base.errors import CircuittexWarning, ConvergenceError, DesignError, FolderError
@@ -127,30 +126,14 @@ def test_each_default_moves_fibrils_by_five_per_cent_of_their_radius() -> None:
 
 @pytest.fixture
 def here(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Members are computed in this process, one after another; returns the folders that were computed."""
-    computed: list[str] = []
-
-    def each(
-        _: object, task: Callable[..., Any], arguments: Mapping[int, tuple[Any, ...]]
-    ) -> Iterator[tuple[int, Any]]:
-        for number, values in reversed(arguments.items()):  # members may finish in any order
-            computed.append(Path(values[1]).name)
-            try:
-                yield number, task(*values)
-            except Exception as error:
-                yield number, error
-
-    monkeypatch.setattr(run_module, "local_client", lambda _: contextlib.nullcontext())
-    monkeypatch.setattr(run_module, "each_result", each)
-    monkeypatch.setattr("circuittex.study.folder.write_report", lambda folder, study: folder)
-    return computed
+    return compute_here(monkeypatch)
 
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Instead of its physics, the numbers of a member are drawn from its seed; its packing is laid out all the same."""
 
-    def draw_study(design: Design, folder: Path, *, workers: int) -> Any:
+    def draw_study(design: Design, folder: Path, *, start: str, workers: int) -> Any:
         if design.numerics.max_iterations == 1:
             return run_study(design, folder, workers=workers)  # which does not converge
         build_mesh(design)

@@ -223,6 +223,13 @@ def _add_ensemble(commands: Commands) -> None:
         "--out", metavar="DIR", type=Path, help="folder of the results (default: results/NAME-ensemble)"
     )
     parser.add_argument("--seed", metavar="S", type=int, help="of the ensemble (default: the one in [packing], or 0)")
+    parser.add_argument(
+        "--start",
+        metavar="START",
+        default="initial",
+        help="where members start: 'initial', their initial weaves (default), or FOLDER[:STATE] of another ensemble "
+        "with the same packings, each from the state (default: relaxed) that the member of its number has there",
+    )
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--workers", metavar="W", type=int, help="processes on this machine (default: its cores)")
     where.add_argument(

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from circuittex.base.errors import DesignError
 from circuittex.base.frozen import frozen
+from circuittex.design import Design
+from circuittex.geometry.mesh import FibrilMesh
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.linear import LinearSolver
 from circuittex.relaxation.starts import START, from_state, repeated_cell, tiled
@@ -48,7 +50,15 @@ def chosen(study: Study, wanted: str, solver: Callable[[], LinearSolver], say: C
             say(f"start of {size}: iteration {iteration}, largest free force {residual:.1e} N")
 
         return Start(f"{TILED}, from {size}", lambda: tiled(mesh, design, solver=solver(), report=report))
-    file, state = _place(wanted)
+    return stored(mesh, design, wanted)
+
+
+def stored(mesh: FibrilMesh, design: Design, wanted: str) -> Start:
+    """The start from the state that FILE[:STATE] names.
+
+    Errors: `DesignError` where the state is none for this design; `StoreError` where there is no such file.
+    """
+    file, state = place(wanted)
     source = load_study(file)
     found = next((record for record in source.records if record.name == state), None)
     if found is None:
@@ -61,7 +71,7 @@ def chosen(study: Study, wanted: str, solver: Callable[[], LinearSolver], say: C
     return Start(f"state {state} of {source.design.name!r}, design {source.design_hash}", lambda: configuration)
 
 
-def _place(wanted: str) -> tuple[Path, str]:
+def place(wanted: str) -> tuple[Path, str]:
     """The file, or folder, and the state that FILE[:STATE] names; the relaxed one where none is named."""
     file, colon, state = wanted.rpartition(":")
     return (Path(file), state) if colon and not Path(wanted).exists() else (Path(wanted), RELAXED)

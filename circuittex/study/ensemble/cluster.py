@@ -64,10 +64,10 @@ def local_client(workers: int) -> Iterator[Client]:
 
 
 @contextlib.contextmanager
-def remote_client(address: str, folder: Path) -> Iterator[Client]:
-    """A client of the scheduler at `address`, all of whose workers see `folder`.
+def remote_client(address: str, folder: Path, source: str = "") -> Iterator[Client]:
+    """A client of the scheduler at `address`, all of whose workers see `folder`, and `source` where one is given.
 
-    Raises `DesignError` where nobody answers, no worker has joined, or a worker does not see the folder.
+    Raises `DesignError` where nobody answers, no worker has joined, or a worker does not see a folder.
     """
     distributed = _distributed()
     try:
@@ -82,12 +82,18 @@ def remote_client(address: str, folder: Path) -> Iterator[Client]:
         except TimeoutError:
             raise DesignError("--scheduler", address, "no worker has joined this scheduler") from None
         with tempfile.NamedTemporaryFile(dir=folder, prefix=".seen-by-") as token:
-            seen = client.run(sees, token.name)
-        blind = [worker for worker, sees in seen.items() if not sees]
-        if blind:
-            allowed = f"it must be a folder that all workers share; the worker at {blind[0]} does not see it"
-            raise DesignError("results folder", str(folder), allowed)
+            _refuse_blind(client, "results folder", str(folder), token.name)
+        if source:
+            _refuse_blind(client, "start", source, source)
         yield client
+
+
+def _refuse_blind(client: Client, field: str, folder: str, path: str) -> None:
+    """Refuse a folder if a worker does not see the `path` in it."""
+    blind = [worker for worker, sees in client.run(sees, path).items() if not sees]
+    if blind:
+        allowed = f"it must be a folder that all workers share; the worker at {blind[0]} does not see it"
+        raise DesignError(field, folder, allowed)
 
 
 async def _call(distributed: Any, address: str) -> None:

@@ -22,6 +22,7 @@ def ensemble_command(options: argparse.Namespace, progress: Callable[[str], None
         folder_of(options),
         members=options.members,
         seed=options.seed,
+        start=options.start,
         address=options.scheduler,
         workers=options.workers,
         progress=progress,

@@ -6,6 +6,8 @@ ensemble.json is strict JSON: a number that is not determined is null, an infini
     1. A change that would break readers of the file gives a new number; new keys do not.
 ``version``, ``design``, ``design_hash``
     version of circuittex, name of the design, and its hash with the packing below
+``start``
+    where members start: ``initial``, or which members' states of another ensemble; ``initial`` where it is missing
 ``packing``
     ``seed`` of the ensemble and the four amplitudes: ``lateral_mm``, ``vertical_mm``, ``twist_turns_per_mm``,
     ``phase_mm``
@@ -33,6 +35,7 @@ from circuittex.base.atomic import write_text
 from circuittex.base.errors import FolderError
 from circuittex.base.version import __version__
 from circuittex.design import Design, design_hash
+from circuittex.results.records import INITIAL
 from circuittex.study.ensemble.figures import save_bands
 from circuittex.study.ensemble.member import plain
 from circuittex.study.ensemble.page import page
@@ -43,24 +46,34 @@ STATE, TABLE, PAGE = "ensemble.json", "ensemble.csv", "ensemble.html"
 COLUMNS = ("state", "loading", "strain", "quantity", "unit", "median", "p5", "p25", "p75", "p95", "members")
 
 
-def open_folder(folder: Path, design: Design) -> None:
-    """Make sure that `folder` is empty of ensembles or holds this one.
+def member_folder(folder: Path, number: int) -> Path:
+    """Where a member of the ensemble in `folder` is.
+
+    >>> member_folder(Path("weave-ensemble"), 7).as_posix()
+    'weave-ensemble/members/0007'
+    """
+    return folder / "members" / f"{number:04d}"
+
+
+def open_folder(folder: Path, design: Design, start: str = INITIAL) -> None:
+    """Make sure that `folder` is empty of ensembles or holds this one, with the same starts.
 
     Raises `FolderError` where it holds another, or one by another version of circuittex.
     """
     path = folder / STATE
-    here = {"design_hash": design_hash(design), "version": __version__, "format": FORMAT}
+    here = {"design_hash": design_hash(design), "version": __version__, "format": FORMAT, "start": start}
     (folder / "members").mkdir(exist_ok=True)
     if not path.exists():
         if any((folder / "members").iterdir()):
             raise FolderError(f"{folder}: it holds members of an ensemble but no {STATE}; take another folder")
-        write_text(path, json.dumps(_head(design), indent=1, allow_nan=False))
+        write_text(path, json.dumps(head(design, start), indent=1, allow_nan=False))
         return
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
-        there = {key: found[key] for key in here}
+        there = {key: found[key] for key in here if key in found or key != "start"}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise FolderError(f"{path}: it cannot be read ({error}); take another folder") from error
+    there = {"start": INITIAL, **there}  # older files have none
     for key, value in here.items():
         if there[key] != value:
             raise FolderError(
@@ -116,16 +129,18 @@ def content(ensemble: Ensemble) -> dict[str, Any]:
         for number, seed in enumerate(ensemble.seeds)
     ]
     columns = [quantity.column for quantity in ensemble.quantities]
-    return {**_head(ensemble.design), "quantities": columns, "states": states, "members": members}
+    return {**head(ensemble.design, ensemble.start), "quantities": columns, "states": states, "members": members}
 
 
-def _head(design: Design) -> dict[str, Any]:
+def head(design: Design, start: str = INITIAL) -> dict[str, Any]:
+    """What ensemble.json says before anything is computed."""
     packing = design.packing
     return {
         "format": FORMAT,
         "version": __version__,
         "design": design.name,
         "design_hash": design_hash(design),
+        "start": start,
         "packing": {
             "seed": packing.seed,
             "lateral_mm": packing.lateral,

@@ -16,7 +16,7 @@ from circuittex.base.errors import CircuittexWarning, ConvergenceError, DesignEr
 from circuittex.base.frozen import frozen
 from circuittex.base.version import __version__
 from circuittex.design import Design, design_hash
-from circuittex.results.records import Record
+from circuittex.results.records import INITIAL, Record
 from circuittex.results.store import RESULTS, load_study
 from circuittex.results.summary import agrees
 from circuittex.study.ensemble.quantities import measure, quantities
@@ -40,11 +40,12 @@ class Outcome:
     """Names of the states on which the routes to the currents disagree."""
 
 
-def compute_member(design: Design, folder: str) -> Outcome:
-    """Compute a member in `folder`, or go on with it, in this thread; its outcome is kept there too.
+def compute_member(design: Design, folder: str, start: str = INITIAL) -> Outcome:
+    """Compute a member in `folder` from `start`, or go on with it, in this thread; its outcome is kept there too.
 
-    A packing that cannot be laid out and an equilibrium that is not found are outcomes: they would not change in
-    another attempt, and the states found before count. Other errors are raised, and nothing is kept of them.
+    A packing that cannot be laid out, a state that is no start for it and an equilibrium that is not found are
+    outcomes: they would not change in another attempt, and the states found before count. Other errors are raised, and
+    nothing is kept of them.
 
     Raises `FileNotFoundError` where the folder of the ensemble is not there: a worker elsewhere does not see it.
     """
@@ -54,7 +55,7 @@ def compute_member(design: Design, folder: str) -> Outcome:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", CircuittexWarning)  # said once, of the ensemble's own folder
-            records: Sequence[Record] = run_study(design, place, workers=1).records
+            records: Sequence[Record] = run_study(design, place, start=start, workers=1).records
     except DesignError as error:
         records, failure = (), str(error)
     except ConvergenceError as error:

@@ -42,6 +42,7 @@ def _facts(ensemble: Ensemble) -> dict[str, str]:
     return {
         "Design hash": ensemble.design_hash,
         "Seed": str(packing.seed),
+        "Start": ensemble.start,
         "Lateral offsets": f"{packing.lateral:.4g} mm",
         "Vertical offsets": f"{packing.vertical:.4g} mm",
         "Twist of the yarns": f"{1e3 * packing.twist:.4g} turns/m",

@@ -9,6 +9,7 @@ import numpy as np
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.frozen import frozen
 from circuittex.design import Design
+from circuittex.results.records import INITIAL
 from circuittex.study.ensemble.quantities import Quantity
 
 BANDS = (5.0, 25.0, 50.0, 75.0, 95.0)
@@ -41,6 +42,8 @@ class Ensemble:
     """(Q,) what was measured."""
     values: Floats
     """(M, S, Q); nan where a member has no such state or the quantity is not determined."""
+    start: str = INITIAL
+    """Where the members' first relaxations start: 'initial', or of whose states."""
 
     @property
     def count(self) -> Ints:

@@ -1,7 +1,7 @@
 """What each part beyond the paper costs on the paper's study: switched on, and, against an older version, off.
 
-    python benchmarks/parts.py [--rounds 1] [--repeats 5]
-    python benchmarks/parts.py --before FOLDER [--rounds 3] [--repeats 11]
+    python benchmarks/parts.py [--rounds 1] [--repeats 3]
+    python benchmarks/parts.py --before FOLDER [--rounds 3] [--repeats 7]
 
 The first compares the paper's cell with the same cell with one part switched on. Parts of the mechanics have a first
 relaxation and a step of 2.5 % of their own; what they change is first of all the equilibrium, so their iterations
@@ -13,7 +13,7 @@ No switch takes code away, so the second compares the stages of the paper's cell
 version in FOLDER (`git worktree add FOLDER COMMIT`).
 
 Seconds are the processor's, of processes with one thread each that work in turn, without ngspice, a process of its
-own; ratios are medians of the quotients within a round. Takes some four minutes each.
+own; ratios are medians of the quotients within a round. Takes six and three minutes.
 """
 
 from __future__ import annotations
@@ -43,7 +43,9 @@ STATES = 21
 VOLTS = 10.0
 """Of the probes where heat is concerned: the paper's 1 V warms its cell by a kelvin."""
 LONG = (RELAXATION, STEP)
-"""Stages that take seconds."""
+"""Stages that take many seconds."""
+SHORT = 15
+"""Rounds of stages that take less than one."""
 
 
 def yarn(design: Design, **changes: Any) -> Design:
@@ -178,10 +180,10 @@ def parts(ask: Asked, names: Sequence[str], stage: str, rounds: int) -> dict[str
     return dict(zip(each, in_turn([lambda part=part: ask(part, stage) for part in each], rounds), strict=True))
 
 
-def mechanics(ask: Asked, names: Sequence[str], rounds: int, repeats: int) -> Table:
+def mechanics(ask: Asked, names: Sequence[str], rounds: int, short: int = SHORT) -> Table:
     """First relaxation, step and assembly with each part."""
     first, step = (parts(ask, names, stage, rounds) for stage in LONG)
-    assembly = parts(ask, names, ASSEMBLY, repeats)
+    assembly = parts(ask, names, ASSEMBLY, short)
     rows: list[list[object]] = []
     for part in (OFF, *names):
         row: list[object] = [part]
@@ -197,9 +199,9 @@ def mechanics(ask: Asked, names: Sequence[str], rounds: int, repeats: int) -> Ta
     )
 
 
-def recording(ask: Asked, names: Sequence[str], repeats: int) -> Table:
+def recording(ask: Asked, names: Sequence[str], repeats: int, short: int = SHORT) -> Table:
     """Contacts and all that is recorded of a state with each part."""
-    contacts, whole = (parts(ask, names, stage, repeats) for stage in (CONTACTS, RECORDING))
+    contacts, whole = parts(ask, names, CONTACTS, short), parts(ask, names, RECORDING, repeats)
     rows = [
         [part, *(value for found in (contacts, whole) for value in (_median(found, part), _of_off(found, part)))]
         for part in (OFF, *names)
@@ -216,12 +218,12 @@ def _of_off(found: Mapping[str, tuple[Floats, int]], part: str) -> float:
     return ratio(found[part][0], found[OFF][0])
 
 
-def off(before: Asked, now: Asked, rounds: int, repeats: int) -> Table:
+def off(before: Asked, now: Asked, rounds: int, repeats: int, version: str = "", short: int = SHORT) -> Table:
     """The stages of the paper's cell in two versions, and what they come to for the paper's study."""
     rows: list[list[object]] = []
     total = np.zeros(2)
     for stage in STAGES:
-        times = rounds if stage in LONG else repeats
+        times = rounds if stage in LONG else repeats if stage == RECORDING else short
         (old, i), (new, j) = in_turn([lambda ask=ask, stage=stage: ask(OFF, stage) for ask in (before, now)], times)
         medians, quotients = np.array([np.median(old), np.median(new)]), new / old
         total += {RELAXATION: 1, STEP: STATES - 1, RECORDING: STATES}.get(stage, 0) * medians
@@ -230,7 +232,14 @@ def off(before: Asked, now: Asked, rounds: int, repeats: int) -> Table:
         rows.append([stage, iterations, *map(float, medians), ratio(new, old), spread])
     rows.append([f"{STATES} states", "", *map(float, total), float(total[1] / total[0]), ""])
     head = ["stage", "iterations", "before s", "now s", "now / before", "of single rounds"]
-    return Table("The paper's cell, everything off, in the older version and in this one:", head, rows)
+    return Table(f"The paper's cell with everything off, before ({version}) and now:", head, rows)
+
+
+def version_of(folder: Path) -> str:
+    """The commit that is checked out in a folder."""
+    words = ["git", "-C", str(folder), "rev-parse", "--short", "HEAD"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    return done.stdout.strip() or "of unknown version"
 
 
 def main() -> None:
@@ -240,19 +249,19 @@ def main() -> None:
         "--parts", nargs="+", metavar="WORD", default=[""], help="parts with one of these in their names"
     )
     parser.add_argument("--rounds", type=int, help="of first relaxations and steps (default: 1, with --before 3)")
-    parser.add_argument("--repeats", type=int, help="of what takes less (default: 5, with --before 11)")
+    parser.add_argument("--repeats", type=int, help="of recordings (default: 3, with --before 7)")
     options = parser.parse_args()
-    rounds, repeats = options.rounds or (3 if options.before else 1), options.repeats or (11 if options.before else 5)
+    rounds, repeats = options.rounds or (3 if options.before else 1), options.repeats or (7 if options.before else 3)
     if options.before is not None:
         if not (options.before / "circuittex").is_dir():
             fail(f"{options.before} is no checkout of circuittex")
         with Worker(options.before.resolve()) as before, Worker() as now:
-            publish(options, [off(before, now, rounds, repeats)])
+            publish(options, [off(before, now, rounds, repeats, version_of(options.before))])
         return
     chosen = [name for name in PARTS if any(word in name for word in options.parts)]
     ours, others = [n for n in chosen if n in MECHANICAL], [n for n in chosen if n not in MECHANICAL]
     with Worker() as ask:
-        tables = [mechanics(ask, ours, rounds, repeats)] if ours else []
+        tables = [mechanics(ask, ours, rounds)] if ours else []
         publish(options, [*tables, *([recording(ask, others, repeats)] if others else [])])
 
 

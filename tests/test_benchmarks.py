@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from circuittex.design import Design, plain_weave
+from circuittex.design import Design, design_hash, plain_weave, uniaxial
 from circuittex.electrical.network.circuit import reduced_circuit
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
@@ -33,6 +33,7 @@ SCRIPTS = [
     "newton",
     "panel",
     "paper_tables",
+    "parts",
     "scaling",
     "size",
     "starts",
@@ -66,7 +67,7 @@ def test_script_explains_itself(name: str, monkeypatch: pytest.MonkeyPatch, caps
 
 
 def test_every_script_is_known_here() -> None:
-    helpers = {"dolfinx_worker", "measure", "watch", "woven"}
+    helpers = {"dolfinx_worker", "measure", "stages_worker", "watch", "woven"}
     assert {path.stem for path in FOLDER.glob("*.py")} == {*SCRIPTS, *helpers}
 
 
@@ -279,6 +280,54 @@ def test_starts_measures_each(monkeypatch: pytest.MonkeyPatch) -> None:
     table = starts.similar(1, 3, 8)
     assert [row[:2] for row in table.rows[:2]] == [["1.1 x modulus", "initial"], ["1.1 x modulus", "state"]]
     assert all(len(row) == len(table.head) for row in table.rows)
+
+
+def test_every_part_is_a_change_of_the_papers_cell() -> None:
+    parts, cell = script("parts"), script("stages_worker").cell()
+    found = {name: design_hash(change(cell)) for name, change in parts.PARTS.items()}
+    assert len({design_hash(cell), *found.values()}) == len(found) + 1
+    assert set(parts.MECHANICAL) < set(found)
+
+
+def test_every_stage_runs_on_a_part_of_its_own_or_on_the_states_of_another() -> None:
+    worker = script("stages_worker")
+    design = replace(tiny(), loading=(uniaxial("stretch", (0.025,)),))
+    case = worker.Case(design)
+    seconds, iterations = worker.timed(case[worker.RELAXATION])
+    assert seconds > 0.0
+    assert iterations == case.relaxed.iterations > 0
+    for stage in worker.STAGES[1:]:
+        worker.timed(case[stage])
+    other = worker.Case(script("parts").law("holm")(design), case)
+    holm, paper = (each[worker.CONTACTS]().conductance.sum() for each in (other, case))
+    assert other.relaxed is None, "its mechanics are those of the other"
+    assert holm > paper, "spots without a film"
+
+
+def test_costs_of_parts_are_ratios_within_a_round() -> None:
+    """A machine that is twice as slow in the second round changes no ratio."""
+    parts, calls = script("parts"), list[tuple[str, str]]()
+
+    def ask(part: str, stage: str) -> tuple[float, int]:
+        calls.append((part, stage))
+        slow = 2.0 ** (calls.count((part, stage)) - 1)
+        return slow * (1.0 if part == "off" else 1.5), 7
+
+    (off, on) = parts.mechanics(ask, ["one"], 2, 3).rows
+    assert on == ["one", 7, pytest.approx(2.25), 1.5, 7, pytest.approx(2.25), 1.5, 1.5]
+    assert off[3] == off[6] == off[7] == 1.0
+    assert [part for part, stage in calls if stage == parts.STEP] == ["off", "one"] * 2
+    assert parts.recording(ask, ["two"], 2, 2).rows[1][2::2] == [1.5, 1.5]
+    table = parts.off(lambda *_: (2.0, 3), lambda *_: (3.0, 3), 1, 1, "0123abc", 1)
+    assert table.rows[-1][2:5] == [2.0 * 42, 3.0 * 42, 1.5]
+    assert {row[4] for row in table.rows} == {1.5}
+    assert "0123abc" in table.title
+
+
+def test_a_process_for_stages_starts_and_ends() -> None:
+    with script("parts").Worker() as worker:
+        assert worker.process.poll() is None
+    assert worker.process.returncode == 0
 
 
 def test_scaling_measures_a_size_and_compares_two() -> None:

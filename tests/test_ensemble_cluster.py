@@ -161,6 +161,19 @@ def test_workers_that_do_not_see_the_folder_are_named(
         pass
 
 
+def test_workers_that_do_not_see_where_members_start_are_named(
+    scheduler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster_module, "sees", lambda path: path != "/somewhere/else")
+    with (
+        pytest.raises(DesignError, match=r"start: '/somewhere/else' is not usable; .* the worker at inproc"),
+        remote_client(scheduler, tmp_path, "/somewhere/else"),
+    ):
+        pass
+    with remote_client(scheduler, tmp_path):
+        pass
+
+
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://a", "127.0.0.1:x"])
 def test_an_address_where_nobody_answers_is_named_and_nothing_is_left_open(
     address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

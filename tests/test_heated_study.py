@@ -166,6 +166,18 @@ def test_other_branches_are_told_apart_by_the_same_currents(heated: Study) -> No
     assert not check.bifurcation
 
 
+def test_a_branch_check_of_a_mixed_fabric_warms_each_yarn_by_its_own_coefficients() -> None:
+    """Its fibrils are in another order, and the materials of a design are not; the same currents but for round-off."""
+    design = weave(emissivity=0.0)
+    yarn = design.weave.warp[0]
+    steady = replace(yarn, name="steady", materials=tuple(replace(m, name="steady", tc1=0.0) for m in yarn.materials))
+    design = replace(design, weave=replace(design.weave, weft=(steady,) * 2), probes=design.probes[1:2])
+    study = run_study(design, branches=True)
+    (check,), (record,) = study.branches, study.records
+    assert record.fields[0].resistivity.max() > 1.05  # what the order of coefficients decides
+    assert check.again.currents == pytest.approx(record.currents, rel=ROUTES)
+
+
 def test_ratings_are_those_of_the_temperatures(heated: Study, linear: Study) -> None:
     """For the design's rise, 10 K, at which radiation and resistances change by some per cent; summary and report."""
     warm, cold = (heating(study, study.records[0]) for study in (heated, linear))

@@ -21,7 +21,7 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.permutation import permuted
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.linear import LinearSolver
-from circuittex.relaxation.relax import relax
+from circuittex.relaxation.relax import Equilibrium, relax
 from circuittex.results.bifurcation import ALLOWED, SETTLED, BranchCheck, difference
 from circuittex.results.outcome import Outcome
 from circuittex.results.records import Record, Study
@@ -83,7 +83,7 @@ def check_branch(
     except ConvergenceError as error:
         nothing = Outcome(np.full((2, 3), nan), (nan,) * len(design.probes), nan, nan, nan)
         return BranchCheck(record.name, record.outcome, nothing, nan, (), str(error))
-    again = outcome_of(design, other, found)
+    again = outcome_of(design, mesh, _in_order(found, nodes))
     moved = float(np.linalg.norm(found.configuration.r - record.configuration.r[nodes], axis=1).max())
     settled: tuple[Outcome, ...] = ()
     trouble = ""
@@ -92,25 +92,37 @@ def check_branch(
         say(f"branch check, {record.name}: relaxing both states further")
         try:
             settled = (
-                _settle(design, mesh, record.configuration, step, least, solver()),
-                _settle(design, other, found.configuration, step, least, solver()),
+                outcome_of(design, mesh, _settled(design, mesh, record.configuration, step, least, solver())),
+                outcome_of(
+                    design, mesh, _in_order(_settled(design, other, found.configuration, step, least, solver()), nodes)
+                ),
             )
         except ConvergenceError as error:
             trouble = str(error)
     return BranchCheck(record.name, record.outcome, again, moved, settled, trouble)
 
 
-def _settle(
+def _in_order(found: Equilibrium, nodes: Ints) -> Equilibrium:
+    """An equilibrium of the fibrils in another order, in which `nodes` (N,) were numbered so, in their own order; its
+    sections are left out.
+
+    A design states its materials in that order, and contacts do not know of another.
+    """
+    x, reaction = np.empty_like(found.configuration.x), np.empty_like(found.reaction)
+    x[nodes], reaction[nodes] = found.configuration.x, found.reaction
+    return replace(found, configuration=Configuration(x), reaction=reaction, section_force=np.empty((0, 3)))
+
+
+def _settled(
     design: Design, mesh: FibrilMesh, state: Configuration, step: Step, tolerance: float, solver: LinearSolver
-) -> Outcome:
-    """What the state comes to when it is relaxed on to a smaller tolerance (N).
+) -> Equilibrium:
+    """The state relaxed on to a smaller tolerance (N).
 
     Raises `ConvergenceError` where round-off does not allow that.
     """
     if tolerance == 0.0:
         raise ConvergenceError("the clamps carry no force that the residual could be measured by")
     sharp = replace(design, numerics=replace(design.numerics, tolerance=f"{tolerance!r} N"))
-    found = relax(
+    return relax(
         mesh, sharp, state, gradient=step.after, free_edges=step.free_edges, gripped=step.gripped, solver=solver
     )
-    return outcome_of(sharp, mesh, found)

@@ -38,6 +38,8 @@ ROUTES = 1e-9
 """Relative: what routes may differ by (`AGREEMENT`), ngspice among them."""
 METAL, ACROSS = 0.004, -0.001
 """1/K, of the fibrils and of the contacts."""
+FALLING = 1.5
+"""A: more than where the voltage along these fibrils is largest (0.9 A, 1.3 V), if their resistance falls by `METAL`."""
 DENSITY = 1e-3
 """W/mm2 of the fabric: 0.1 W/cm2."""
 
@@ -176,6 +178,22 @@ def test_a_branch_check_of_a_mixed_fabric_warms_each_yarn_by_its_own_coefficient
     (check,), (record,) = study.branches, study.records
     assert record.fields[0].resistivity.max() > 1.05  # what the order of coefficients decides
     assert check.again.currents == pytest.approx(record.currents, rel=ROUTES)
+
+
+def test_what_a_current_warms_is_compared_at_the_temperatures_of_that_current() -> None:
+    """Beyond the largest voltage that a falling resistance takes, the same voltage has another, cooler state."""
+    design = weave(tc1=-METAL, emissivity=0.0)
+    numerics = replace(design.numerics, contact_points=8)
+    design = replace(design, numerics=numerics, probes=(Probe("amperes", "left", "right", current=FALLING),))
+    study = run_study(design, error_estimate=True, branches=True)
+    (record,) = study.records
+    assert run_study(record.driven(design)).records[0].currents[0] < 0.5 * FALLING
+    (check,), (estimate,) = study.branches, study.errors
+    assert check.again.currents == pytest.approx(record.currents, rel=ROUTES)
+    current = estimate.quantity("I amperes")
+    assert current.value == pytest.approx(FALLING, rel=ROUTES)
+    assert 0.0 < current.relative < 0.1
+    assert not estimate.warnings
 
 
 def test_ratings_are_those_of_the_temperatures(heated: Study, linear: Study) -> None:

@@ -73,17 +73,17 @@ def check_branch(
     equilibrium is a result and no error. `solver` makes the linear solver of each relaxation; `say` is told of the
     progress.
     """
-    mesh, design = study.mesh, record.driven(study.design)  # currents at the same voltages tell branches apart
+    mesh, design = study.mesh, study.design
     other, nodes = permuted(mesh, another_permutation(mesh.n_fibrils))
     shuffled = replace(study, mesh=other, initial=Configuration(study.initial.x[nodes]))
     try:
         found = reach(
             shuffled, step, Configuration(start.x[nodes]), solver, lambda text: say(f"branch check, {text}")
         ).equilibrium
+        again = outcome_of(design, mesh, _in_order(found, nodes), record)
     except ConvergenceError as error:
         nothing = Outcome(np.full((2, 3), nan), (nan,) * len(design.probes), nan, nan, nan)
         return BranchCheck(record.name, record.outcome, nothing, nan, (), str(error))
-    again = outcome_of(design, mesh, _in_order(found, nodes))
     moved = float(np.linalg.norm(found.configuration.r - record.configuration.r[nodes], axis=1).max())
     settled: tuple[Outcome, ...] = ()
     trouble = ""
@@ -91,12 +91,9 @@ def check_branch(
     if difference(record.outcome, again) > ALLOWED and max(record.residual, found.residual) > least:
         say(f"branch check, {record.name}: relaxing both states further")
         try:
-            settled = (
-                outcome_of(design, mesh, _settled(design, mesh, record.configuration, step, least, solver())),
-                outcome_of(
-                    design, mesh, _in_order(_settled(design, other, found.configuration, step, least, solver()), nodes)
-                ),
-            )
+            one = _settled(design, mesh, record.configuration, step, least, solver())
+            two = _settled(design, other, found.configuration, step, least, solver())
+            settled = tuple(outcome_of(design, mesh, each, record) for each in (one, _in_order(two, nodes)))
         except ConvergenceError as error:
             trouble = str(error)
     return BranchCheck(record.name, record.outcome, again, moved, settled, trouble)

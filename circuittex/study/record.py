@@ -190,16 +190,36 @@ def _fields(
     return fields, fields
 
 
-def outcome_of(design: Design, mesh: FibrilMesh, equilibrium: Equilibrium) -> Outcome:
-    """The numbers of an equilibrium and nothing else, for one that is not recorded; probes are driven by voltages."""
-    contacts = contacts_of(design, mesh, equilibrium.configuration)
-    cold: Sequence[Potential] = solve_potentials(contacts, design.terminals, design.probes)
-    fields = steady_fields(design, design, contacts, cold) if design.electrical.heating == NONLINEAR else cold
-    currents = tuple(float(field.currents[0]) for field in fields)
+def outcome_of(design: Design, mesh: FibrilMesh, equilibrium: Equilibrium, record: Record) -> Outcome:
+    """The numbers of another equilibrium of the state of `record`, and nothing else: currents at the voltages that the
+    probes have there.
+
+    Where resistances follow the temperatures these are those that a probe makes as it is stated: what a current warms
+    may have another steady state at its voltage, or none.
+
+    Raises `ConvergenceError` where there is no steady state.
+    """
+    contacts, driven = contacts_of(design, mesh, equilibrium.configuration), record.driven(design)
+    cold = solve_potentials(contacts, driven.terminals, driven.probes)
+    currents = tuple(float(field.currents[0]) for field in cold)
+    if design.electrical.heating == NONLINEAR:
+        currents = _warm_currents(design, contacts, record)
     merged = simplified(design, contacts).contacts
-    told = told_currents(cold, probe_circuits(contacts, design.terminals, design.probes), design)
-    fit = fit_network(told, design, port_matrix(build_circuit(merged, conducting_ends(mesh))))
+    told = told_currents(cold, probe_circuits(contacts, driven.terminals, driven.probes), driven)
+    fit = fit_network(told, driven, port_matrix(build_circuit(merged, conducting_ends(mesh))))
     return outcome(clamp_force(mesh, equilibrium.reaction), currents, fit, equilibrium.energy)
+
+
+def _warm_currents(design: Design, contacts: ContactState, record: Record) -> tuple[float, ...]:
+    """The currents, A, at the voltages of a record through the resistances at the temperatures of the probes."""
+    cold = at_voltages(design, contacts, record.gradient)
+    potentials = solve_potentials(contacts, cold.terminals, cold.probes)
+    try:
+        fields = steady_fields(design, cold, contacts, potentials, fabric_area(design, record.gradient))
+    except DesignError as error:
+        raise ConvergenceError(str(error)) from error
+    pairs = zip(fields, record.fields, strict=True)
+    return tuple(float(field.currents[0]) * (there.voltage / field.voltage) for field, there in pairs)
 
 
 def centre_crossing(design: Design) -> tuple[int, float]:

@@ -39,7 +39,7 @@ ROUTES = 1e-9
 METAL, ACROSS = 0.004, -0.001
 """1/K, of the fibrils and of the contacts."""
 FALLING = 1.5
-"""A: more than where the voltage along these fibrils is largest (0.9 A, 1.3 V), if their resistance falls by `METAL`."""
+"""A: beyond where the voltage along these fibrils is largest (0.9 A, 1.3 V), if their resistance falls by `METAL`."""
 DENSITY = 1e-3
 """W/mm2 of the fabric: 0.1 W/cm2."""
 

@@ -49,7 +49,7 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
         contact points at full resolution; levels in which the fibrils of the centre warp yarn lie at its centre
         crossing
     ``deepest_overlap``, ``largest_stress_MPa``
-        the deepest overlap of two fibrils over R + R', and the largest force of a section over its reference area
+        the deepest overlap of two fibrils over R + R', and the largest axial stress, bending included, of core or shell
     ``doubts``
         why the state cannot be right or trusted, in sentences: overlaps, stresses, temperatures, the mesh, probes that
         cannot be driven as stated; empty if all is well

@@ -97,7 +97,7 @@ def test_all_routes_confirm_each_probe_at_its_temperatures(folder: Path, heated:
     faint, volts, amperes, watts = record.fields
     assert volts.peak_temperature > 20.0
     assert amperes.currents[0] == pytest.approx(-0.4, rel=ROUTES)
-    area = fabric_area(heated.design, record.gradient)
+    area = fabric_area(heated.mesh, record.configuration)
     assert watts.voltage * watts.currents[0] == pytest.approx(DENSITY * area, rel=ROUTES)
     for field in record.fields:
         assert field.heat_out + field.heat_lost == pytest.approx(field.voltage * field.currents[0], rel=ROUTES)
@@ -199,7 +199,7 @@ def test_what_a_current_warms_is_compared_at_the_temperatures_of_that_current() 
 def test_ratings_are_those_of_the_temperatures(heated: Study, linear: Study) -> None:
     """For the design's rise, 10 K, at which radiation and resistances change by some per cent; summary and report."""
     warm, cold = (heating(study, study.records[0]) for study in (heated, linear))
-    area = fabric_area(heated.design, heated.records[0].gradient)
+    area = fabric_area(heated.mesh, heated.records[0].configuration)
     for one, other, field in zip(warm, cold, heated.records[0].fields, strict=True):
         assert one.rated_current == field.rated[1]
         assert one.rated_power_density == pytest.approx(100 * field.rated[2] / area, rel=ROUTES)

@@ -154,7 +154,7 @@ def _not_driven(study: Study, record: Record) -> list[str]:
         current = float(field.currents[0])
         wanted = probe.current or 0.0
         if probe.power_density is not None:
-            wanted = probe.power_density * fabric_area(study.design, record.gradient) / field.voltage
+            wanted = probe.power_density * fabric_area(study.mesh, record.configuration) / field.voltage
         if field.voltage == 1.0 and not abs(current - wanted) < REACHED * abs(wanted):
             idle.append(f"{probe.name} ({probe.drive})")
     return idle

@@ -69,6 +69,15 @@ def test_insulated_ends_leave_one_temperature() -> None:
     assert found.heat_out == 0.0
 
 
+@pytest.mark.parametrize("part", [1e-9, 1e-12, 1e-15])
+def test_however_little_leaves_it_is_what_is_released(part: float) -> None:
+    """Surfaces that take 13 to 19 decades less than a segment conducts, and nothing else: still T = q / g."""
+    state, g = rails(OHM, 0.0, LENGTH, 1, elements=500), part * LOSS
+    found = solve_fields(state, ENDS, ALONG, cooling=Cooling(np.full(2, g), np.zeros(2)))
+    np.testing.assert_allclose(found.temperature[found.fibril == 0], SOURCE / g, rtol=1e-9)
+    assert found.heat_lost == pytest.approx(found.heat, rel=1e-12)
+
+
 @pytest.mark.parametrize("end", [None, 0.0, 3e-3])
 def test_what_is_fed_in_leaves_whatever_the_contacts(end: float | None) -> None:
     """V I = ends + surface, with contacts that heat and conduct heat."""

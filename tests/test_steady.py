@@ -106,6 +106,28 @@ def test_a_fibril_of_one_temperature(stated: str, tc1: float, tc2: float) -> Non
         assert found.currents[0] == pytest.approx(drive, rel=ROUNDING)
 
 
+@pytest.mark.parametrize("stated", DRIVES)
+def test_a_fibril_of_one_temperature_however_little_leaves(stated: str) -> None:
+    """Surfaces that take 16 decades less than a segment conducts, and as much less power: no runaway, but that rise."""
+    part, state = 1e-12, straight(elements=500)
+    drive = DRIVES[stated] * (1.0 if stated == "power_density" else np.sqrt(part))
+    found = solve_steady(
+        state,
+        ENDS,
+        along(**{stated: drive}),
+        following(state, 0.004),
+        cooling=surfaces(state, part * H),
+        area=part,
+        rise=10.0,
+    )
+    power = found.voltage * found.currents[0]
+    T = power / (SURFACE * part * H)
+    assert T > 20.0
+    np.testing.assert_allclose(found.temperature[found.fibril == 0], T, rtol=ROUNDING)
+    assert found.voltage / found.currents[0] == pytest.approx(WHOLE * (1 + 0.004 * T), rel=ROUNDING)
+    assert found.rated[2] == pytest.approx(SURFACE * part * H * 10.0, rel=ROUNDING)
+
+
 def test_a_coated_fibril_of_one_temperature() -> None:
     """Core and shell side by side, of which the shell carries a third when cold: each resists as it is warm."""
     state, (tc1, tc2), (shell1, shell2), w, volts = straight(), (0.005, 0.0), (-0.003, 4e-6), 1 / 3, DRIVES["voltage"]

@@ -19,8 +19,8 @@ from circuittex.electrical.fields.coefficients import Coefficients
 from circuittex.electrical.fields.cooling import Cooling
 from circuittex.electrical.fields.flow import Flow, electric_conductance, flow_of, joule_heat
 from circuittex.electrical.fields.line import FibrilLine
-from circuittex.electrical.fields.solution import Fields, Mesh, fields_of, line_of, losses
-from circuittex.electrical.fields.system import System, build_system, outflow, peak
+from circuittex.electrical.fields.solution import Fields, Mesh, fields_of, line_of, losses, thermal_anchor
+from circuittex.electrical.fields.system import System, build_system, measured, outflow, peak
 from circuittex.electrical.fields.tangent import (
     Resistors,
     Tangent,
@@ -196,6 +196,13 @@ class _Problem:
         return resistors_of(self.line, self.electric, self.thermal, self.coefficients, self.contact_heat, elements)
 
     @cached_property
+    def anchor(self) -> Ints | None:
+        """From which dof the temperature of each is measured (`thermal_anchor`)."""
+        _, cold = radiated(self.thermal.basis, self.radiating, np.zeros(self.thermal.basis.N))
+        leaves = replace(self.thermal, loss=self.thermal.loss + cold)
+        return thermal_anchor(self.line, leaves) if len(self.cooling.end) else None
+
+    @cached_property
     def inside(self) -> Ints:
         """The dofs whose temperature is sought."""
         every = np.arange(self.thermal.basis.N)
@@ -284,17 +291,17 @@ def _correction(
     resistors, inside = problem.resistors, at.inside
     away, more = radiated(problem.thermal.basis, problem.radiating, T)
     residual = outflow(problem.thermal, T) + away - power * (resistors.warms @ at.heat)
-    cooling = problem.thermal.stiffness + problem.thermal.loss + more
+    move, cooling = measured(replace(problem.thermal, loss=problem.thermal.loss + more), problem.anchor)
     exponent = EXPONENTS[problem.probe.stated] if at.heat.any() else 0
     try:
-        matrix = splu(linearised(resistors, at, cooling, power, exponent, hot))
+        matrix = splu(linearised(resistors, at, cooling, move, power, exponent, hot))
     except RuntimeError:  # singular: at a fold
         return None
     right = np.zeros(matrix.shape[0])
-    right[len(at.free) : len(at.free) + len(inside)] = -residual[inside]
+    right[len(at.free) : len(at.free) + len(inside)] = -(move.T @ residual)[inside]
     if hot is not None:
         right[-1] = rise - T[hot]
     solution = matrix.solve(right)
     correction = np.zeros(len(T))
     correction[inside] = solution[len(at.free) : len(at.free) + len(inside)]
-    return correction, 0.0 if hot is None else float(solution[-1])
+    return move @ correction, 0.0 if hot is None else float(solution[-1])

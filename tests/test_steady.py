@@ -330,7 +330,7 @@ def test_below_the_fold_a_voltage_has_the_colder_of_two_states() -> None:
         )  # near the fold rounding counts 1 / sqrt(2e-3) times
 
 
-@pytest.mark.parametrize("times", [1.002, 50.0])
+@pytest.mark.parametrize("times", [1.002, 50.0, 1e5])
 def test_past_the_fold_a_voltage_is_refused(times: float) -> None:
     """And the error says where the fold is: it lies within four of the shortest steps, 0.1 % of the square each."""
     with pytest.raises(DesignError, match=r"probes\.along\.voltage.*thermal runaway") as refused:

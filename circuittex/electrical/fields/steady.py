@@ -42,6 +42,8 @@ PEAK = 1e-9
 """Relative difference of the largest rise from the one for which current and power are rated."""
 LEAST = 1e-3
 """Step of the drive, in parts of what has been reached, that is not halved further."""
+NONE = 1e-20
+"""Part of what is wanted below which nothing is looked for: 100 kV in place of 10 uV."""
 EXPONENTS = {"voltage": 0, "power_density": 1, "current": 2}
 """n in p G^n = const for what is stated of a probe: p = V^2 itself, the power p G, or the square of the current."""
 
@@ -117,7 +119,7 @@ def _raised(step: Callable[[float, _State], _State | None], state: _State) -> tu
             reached, state, size = part, found, 2.0 * size
             continue
         size = 0.25 * (part - reached)
-        if size < LEAST * max(reached, LEAST):
+        if size < max(LEAST * reached, NONE):
             break
     return reached, state
 

@@ -397,6 +397,9 @@ def test_the_rated_current_of_a_fibril_of_one_temperature(tc1: float) -> None:
         assert found.rated.tolist() == pytest.approx(
             [T, np.sqrt(leaves(T) / (WHOLE * (1 + tc1 * T))), leaves(T)], rel=ROUNDING
         )
+    if tc1 < 0.0:  # 1 + tc1 T is negative there
+        beyond = solve_steady(state, ENDS, along(voltage=1e-3), following(state, tc1), cooling=cooling, rise=-1.1 / tc1)
+        assert np.isnan(beyond.rated[1:]).all()
     idle = (ENDS[0], Terminal("far", (("warp2", 1),)))
     nothing = Probe("apart", "one", "far", 1.0)
     assert np.isnan(solve_steady(state, idle, nothing, following(state, tc1), cooling=cooling, rise=T).rated[1:]).all()

@@ -32,7 +32,8 @@ class Heating:
     voltage: float
     """Of the source above the sink, V."""
     rated_current: float
-    """The current at which the largest rise is the rated one, A; nan where nothing is warmed, and so the next two."""
+    """The current at which the largest rise is the rated one, A; nan where nothing is warmed, or nothing warms by that
+    (a resistance that would have to be negative), and so the next two."""
     rated_power: float
     """The power that the source feeds in then, V I, W."""
     rated_power_density: float
@@ -103,7 +104,7 @@ def rating(field: Fields, rise: float) -> tuple[float, float]:
 
     The equations of a probe are linear and its heat is quadratic in the voltage: the rise goes with the square of
     voltage and current, hence by sqrt(rise / peak). Where they are not linear these were solved for with the fields,
-    for one rise. nan where nothing is warmed, and for other rises than that.
+    for one rise. nan where nothing is warmed, or nothing warms by that, and for other rises than that.
     """
     current = float(field.currents[0])
     if len(field.rated):

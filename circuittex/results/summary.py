@@ -39,7 +39,7 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
         of each probe: ``voltage_V``, ``power_W``, ``power_density_W_cm2`` of the fabric, ``peak_temperature_K``,
         ``along_yarns``, the part of the heat that leaves along the yarns rather than at their ends, and
         ``rated_current_A``, ``rated_power_W``, ``rated_power_density_W_cm2``: what the source may feed in for the
-        hottest point to rise by ``rated_rise`` of the parameters (``electrical``), null where nothing is warmed
+        hottest point to rise by ``rated_rise`` of the parameters (``electrical``), null where nothing is warmed by it
     ``Ry_ohm``, ``Rc_ohm``, ``fit_residual``, ``fit_warnings``, ``network``, ``ports``
         the reduced network, its misfit, and what the fit warns of; ``Ry_ohm`` is null where there are several kinds of
         yarn, ``network`` has ``fitted_to``, ``Ry_ohm`` of each kind, ``Rc_ohm`` of each pair of kinds that cross,

@@ -126,7 +126,7 @@ def _raised(step: Callable[[float, _State], _State | None], state: _State) -> tu
 
 def _rated(problem: _Problem, T: Floats, power: float, rise: float) -> Floats:
     """(3,) that rise of the hottest point, and current and power that the source feeds in then, K, A, W; nan where
-    nothing is warmed. From a solution T (N,) at the square of a voltage, `power`.
+    nothing is warmed, or not by that. From a solution T (N,) at the square of a voltage, `power`.
 
     The hottest dof has what makes the hottest point, which lies beside it, rise by that.
     """

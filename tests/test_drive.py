@@ -36,6 +36,7 @@ from circuittex.results.soundness import doubts
 from circuittex.results.store import load_study
 from circuittex.results.summary import summary, table
 from circuittex.study.drive import at_voltages
+from circuittex.study.ensemble.quantities import measure, quantities
 from circuittex.study.kit import write_kit
 from circuittex.study.library.export import export_library
 from circuittex.study.run import run_study
@@ -197,6 +198,18 @@ def test_all_that_is_told_of_a_state_agrees(cell: Study, folder: Path) -> None:
     assert abs(driven[1] / driven[0] - 1) > 0.01  # the stretch shows in the voltage
     assert "U across (V)" in page(cell, {})
     assert "0.02 W/cm2" in page(cell, {})
+
+
+def test_an_ensemble_measures_the_voltage_that_follows(cell: Study) -> None:
+    """Of a probe that is driven by a current it is all there is to know; names and values go together."""
+    names = [quantity.column for quantity in quantities(cell.design)]
+    assert [name for name in names if name.endswith("_V")] == [f"voltage_{n}_V" for n in ("amperes", "watts", "across")]
+    for record in cell.records:
+        values = dict(zip(names, measure(cell.design, record), strict=True))
+        found = probed(record)
+        assert values["voltage_across_V"] == found["across"].voltage
+        assert values["current_watts_A"] == found["watts"].currents[0]
+        assert values["Rc_ohm"] == record.fit.Rc
 
 
 def test_a_state_is_that_of_its_voltages_to_the_last_bit(cell: Study) -> None:

@@ -18,6 +18,8 @@ HOT = 300.0
 SEEN = 1.4
 """Contact points across a contact: with fewer they see its middle or miss it by chance. Rc was 8 % off with 1.7 of
 them, 55 % with 0.3 (copper of 25 um)."""
+BALANCED = 1e-6
+"""Relative: heat that leaves and heat that is released. Direct solutions keep some ten digits, refined."""
 REACHED = 0.01
 """Relative difference of a probe's current or power from what is stated: currents near nothing have few digits."""
 SPREADING = ("holm", "film")
@@ -146,6 +148,15 @@ def _unreal(design: Design) -> str:
     return reason if design.electrical.heating == NONLINEAR else f"{reason}, and conductivities are constant"
 
 
+def unbalanced(record: Record) -> float:
+    """Largest part of the heat of a probe that does not leave, or leaves without having been released: rounding, unless
+    next to nothing leaves the fibrils."""
+    parts = [
+        abs(field.heat_out + field.heat_lost - field.heat) / field.heat for field in record.fields if field.heat != 0.0
+    ]
+    return float(np.nan_to_num(np.max(parts, initial=0.0), nan=np.inf))
+
+
 def _not_driven(study: Study, record: Record) -> list[str]:
     """The probes that do not carry the current, or take the power, that the design states."""
     idle = []
@@ -165,7 +176,7 @@ class Doubt:
     """One reason to doubt a state."""
 
     kind: str
-    """'overlap', 'stress', 'temperature', 'drive', 'mesh' or 'shell'."""
+    """'overlap', 'stress', 'temperature', 'balance', 'drive', 'mesh' or 'shell'."""
     excess: float
     """How far it is beyond what gives no reason, as a ratio of at least 1."""
     text: str
@@ -199,6 +210,12 @@ def doubts(study: Study, record: Record) -> tuple[Doubt, ...]:
             rise / HOT,
             f"the temperature rises by up to {rise:.3g} K (warned of from {HOT:g} K on): {_unreal(study.design)}, "
             "so that this is no prediction",
+        ),
+        Doubt(
+            "balance",
+            unbalanced(record) / BALANCED,
+            f"{unbalanced(record):.1g} of a probe's heat does not leave: surfaces and ends take too little for the "
+            "digits of temperatures; state a larger electrical.heat_loss",
         ),
         Doubt(
             "drive",

@@ -51,8 +51,8 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
     ``deepest_overlap``, ``largest_stress_MPa``
         the deepest overlap of two fibrils over R + R', and the largest axial stress, bending included, of core or shell
     ``doubts``
-        why the state cannot be right or trusted, in sentences: overlaps, stresses, temperatures, the mesh, probes that
-        cannot be driven as stated; empty if all is well
+        why the state cannot be right or trusted, in sentences: overlaps, stresses, temperatures, heat, the mesh, probes
+        that cannot be driven as stated; empty if all is well
     ``netlist``
         path of the detailed netlist, relative to the folder of the file
     ``error_estimate``

@@ -42,7 +42,7 @@ def rows(study: Study, mesh: FibrilMesh, nodes: Ints, solver: Callable[[], Linea
         record = records[step.name]
         before = records[step.previous].configuration if step.previous else study.initial
         state = reach(other, step, Configuration(before.x[nodes]), solver, lambda _: None)
-        outcome = outcome_of(study.design, mesh, state.equilibrium)
+        outcome = outcome_of(study.design, mesh, state.equilibrium, record)
         differences = force_difference(record.outcome, outcome), current_difference(record.outcome, outcome)
         found.append([step.name, state.iterations, record.iterations, *(f"{value:.1e}" for value in differences)])
     return found

@@ -360,6 +360,8 @@ def test_what_cannot_be_is_refused_at_once() -> None:
         Clamps(-1.0)
     with pytest.raises(DesignError, match=r"^clamps\.weft_force: 'loose' .*'held'"):
         Clamps(0.0, "loose")
+    with pytest.raises(DesignError, match=r"^clamps\.weft_force: 'loose' .* in N .* or 'held'"):
+        parse_design(tomllib.loads(SMALL + '[clamps]\nweft_force = "loose"\n'))
     with pytest.raises(DesignError, match=r"^clamps\.weft_force: 1\.0 .*at most 0\.7069 N"):
         under(design, 0.0, 1.0)
     strip = (uniaxial("strip", (0.1,), free="y"),)

@@ -19,6 +19,7 @@ from circuittex.geometry.weave import build_mesh
 from circuittex.results.heating import heating
 from circuittex.results.records import Study
 from circuittex.results.report.page import page
+from circuittex.results.soundness import doubts
 from circuittex.results.summary import summary
 from circuittex.study.run import run_study
 
@@ -67,6 +68,15 @@ def test_insulated_ends_leave_one_temperature() -> None:
     found = solve_fields(state, ENDS, ALONG, cooling=Cooling(np.full(2, LOSS), np.zeros(2)))
     np.testing.assert_allclose(found.temperature[found.fibril == 0], SOURCE / LOSS, rtol=1e-10)
     assert found.heat_out == 0.0
+
+
+@pytest.mark.parametrize("part", [1e-9, 1e-12, 1e-15])
+def test_however_little_leaves_it_is_what_is_released(part: float) -> None:
+    """Surfaces that take 13 to 19 decades less than a segment conducts, and nothing else: still T = q / g."""
+    state, g = rails(OHM, 0.0, LENGTH, 1, elements=500), part * LOSS
+    found = solve_fields(state, ENDS, ALONG, cooling=Cooling(np.full(2, g), np.zeros(2)))
+    np.testing.assert_allclose(found.temperature[found.fibril == 0], SOURCE / g, rtol=1e-9)
+    assert found.heat_lost == pytest.approx(found.heat, rel=1e-12)
 
 
 @pytest.mark.parametrize("end", [None, 0.0, 3e-3])
@@ -164,6 +174,19 @@ def test_report_and_summary_tell_of_heat(heater: Study) -> None:
     assert "W/cm²" in page(heater, {})
     cold = replace(heater, design=replace(heater.design, electrical=Electrical()))
     assert "W/cm²" not in page(cold, {})
+
+
+@pytest.mark.parametrize(("loss", "balanced"), [(1e-20, False), (1e-12, True)])
+def test_heat_that_is_not_balanced_is_a_doubt(heater: Study, loss: float, balanced: bool) -> None:
+    """A surface that takes 17 decades less than the contacts hand over: there are no digits for that."""
+    (record,), design = heater.records, heater.design
+    design = replace(design, electrical=replace(design.electrical, heat_loss=loss))
+    fields = solve_probes(
+        record.contacts, design.terminals, design.probes, cooling=cooling_of(design, record.contacts.mesh)
+    )
+    kinds = [doubt.kind for doubt in doubts(replace(heater, design=design), replace(record, fields=fields))]
+    assert ("balance" in kinds) != balanced
+    assert not any(doubt.kind == "balance" for doubt in doubts(heater, record))
 
 
 def test_heat_must_leave_somewhere() -> None:

@@ -139,4 +139,4 @@ def test_table_summary_and_report_list_every_kind(tmp_path: Path) -> None:
 def test_an_ensemble_measures_every_kind() -> None:
     names = [quantity.name for quantity in quantities(STUDY.design)]
     assert names[-5:] == [name.replace(" ", "_") for name in NAMES]
-    assert measure(STUDY.records[0])[-5:] == pytest.approx(OHMS)
+    assert measure(STUDY.design, STUDY.records[0])[-5:] == pytest.approx(OHMS)

@@ -16,16 +16,27 @@ from circuittex.base.errors import DesignError
 from circuittex.base.frozen import same
 from circuittex.command.cli import main
 from circuittex.command.exit_codes import ExitCode
-from circuittex.design import Design, Electrical, Probe, Terminal, design_hash, parse_design, plain_weave, uniaxial
+from circuittex.design import (
+    Clamps,
+    Design,
+    Electrical,
+    Probe,
+    Terminal,
+    design_hash,
+    parse_design,
+    plain_weave,
+    uniaxial,
+)
 from circuittex.electrical.fields import Fields, cooling_of, solve_fields, solve_probes
 from circuittex.electrical.spice.ngspice import run_deck
-from circuittex.results.heating import heating
+from circuittex.results.heating import fabric_area, heating
 from circuittex.results.records import Record, Study
 from circuittex.results.report.page import page
 from circuittex.results.soundness import doubts
 from circuittex.results.store import load_study
 from circuittex.results.summary import summary, table
 from circuittex.study.drive import at_voltages
+from circuittex.study.ensemble.quantities import measure, quantities
 from circuittex.study.kit import write_kit
 from circuittex.study.library.export import export_library
 from circuittex.study.run import run_study
@@ -119,6 +130,22 @@ def test_a_current_or_a_power_along_one_fibril(alone: Study) -> None:
     )
 
 
+def test_the_area_of_the_fabric_is_that_between_its_clamps_and_edges() -> None:
+    """Clamps slide under a force, and free edges draw in: power and W/cm2 are of what lies between the yarns' ends."""
+    stretch, strip = uniaxial("stretch", (STRETCH / 10,)), uniaxial("strip", (STRETCH / 10,), free="y")
+    design = replace(weave(0.01), clamps=Clamps(0.1, 0.0), loading=(stretch, strip))
+    study = run_study(replace(design, probes=design.probes[2:3], numerics=replace(design.numerics, elements=8)))
+    for record, state in zip(study.records, summary(study)["states"], strict=True):
+        warp, weft = np.array(state["extension"]).reshape(2, 2).mean(axis=1)
+        area = SPAN**2 * (1 + warp) * (1 + weft)
+        assert abs(area / (SPAN**2 * np.linalg.det(record.gradient)) - 1) > 0.01  # what clamps and edges have moved
+        (field,), (heat,) = record.fields, state["heating"]
+        assert field.heat == pytest.approx(DENSITY * area, rel=ROUTES)
+        assert heat["power_density_W_cm2"] == pytest.approx(100 * DENSITY, rel=ROUTES)
+        assert heat["rated_power_density_W_cm2"] == pytest.approx(100 * heat["rated_power_W"] / area, rel=ROUTES)
+        assert not any(doubt.kind == "drive" for doubt in doubts(study, record))
+
+
 def test_ratings_of_one_fibril(alone: Study) -> None:
     """The same current whatever the probe is driven by, from the fin; power and W/cm2 are R I^2."""
     current = np.sqrt(RISE / peak(1.0))
@@ -173,12 +200,24 @@ def test_all_that_is_told_of_a_state_agrees(cell: Study, folder: Path) -> None:
     assert "0.02 W/cm2" in page(cell, {})
 
 
+def test_an_ensemble_measures_the_voltage_that_follows(cell: Study) -> None:
+    """Of a probe that is driven by a current it is all there is to know; names and values go together."""
+    names = [quantity.column for quantity in quantities(cell.design)]
+    assert [name for name in names if name.endswith("_V")] == [f"voltage_{n}_V" for n in ("amperes", "watts", "across")]
+    for record in cell.records:
+        values = dict(zip(names, measure(cell.design, record), strict=True))
+        found = probed(record)
+        assert values["voltage_across_V"] == found["across"].voltage
+        assert values["current_watts_A"] == found["watts"].currents[0]
+        assert values["Rc_ohm"] == record.fit.Rc
+
+
 def test_a_state_is_that_of_its_voltages_to_the_last_bit(cell: Study) -> None:
     """No other solution than for a probe whose voltage is stated; such designs are what they were."""
     record = cell.records[1]
     volts = record.driven(cell.design)
     assert [probe.voltage for probe in volts.probes] == [field.voltage for field in record.fields]
-    assert at_voltages(volts, record.contacts, record.gradient) is volts
+    assert at_voltages(volts, record.contacts, 1.0) is volts
     assert record.driven(volts) is volts
     found = solve_probes(
         record.contacts, volts.terminals, volts.probes, cooling=cooling_of(cell.design, record.contacts.mesh)
@@ -192,7 +231,8 @@ def test_what_is_rated_is_reached(cell: Study) -> None:
         for number, each in enumerate(heating(cell, record)):
             own = cell.design.probes[number]
             probe = Probe(own.name, own.source, own.sink, **drive(each))
-            design = at_voltages(replace(cell.design, probes=(probe,)), record.contacts, record.gradient)
+            area = fabric_area(cell.mesh, record.configuration)
+            design = at_voltages(replace(cell.design, probes=(probe,)), record.contacts, area)
             cooling = cooling_of(design, cell.mesh)
             (field,) = solve_probes(record.contacts, design.terminals, design.probes, cooling=cooling)
             assert field.peak_temperature == pytest.approx(RISE, rel=ROUTES)

@@ -38,6 +38,8 @@ ROUTES = 1e-9
 """Relative: what routes may differ by (`AGREEMENT`), ngspice among them."""
 METAL, ACROSS = 0.004, -0.001
 """1/K, of the fibrils and of the contacts."""
+FALLING = 1.5
+"""A: beyond where the voltage along these fibrils is largest (0.9 A, 1.3 V), if their resistance falls by `METAL`."""
 DENSITY = 1e-3
 """W/mm2 of the fabric: 0.1 W/cm2."""
 
@@ -95,7 +97,7 @@ def test_all_routes_confirm_each_probe_at_its_temperatures(folder: Path, heated:
     faint, volts, amperes, watts = record.fields
     assert volts.peak_temperature > 20.0
     assert amperes.currents[0] == pytest.approx(-0.4, rel=ROUTES)
-    area = fabric_area(heated.design, record.gradient)
+    area = fabric_area(heated.mesh, record.configuration)
     assert watts.voltage * watts.currents[0] == pytest.approx(DENSITY * area, rel=ROUTES)
     for field in record.fields:
         assert field.heat_out + field.heat_lost == pytest.approx(field.voltage * field.currents[0], rel=ROUTES)
@@ -166,10 +168,38 @@ def test_other_branches_are_told_apart_by_the_same_currents(heated: Study) -> No
     assert not check.bifurcation
 
 
+def test_a_branch_check_of_a_mixed_fabric_warms_each_yarn_by_its_own_coefficients() -> None:
+    """Its fibrils are in another order, and the materials of a design are not; the same currents but for round-off."""
+    design = weave(emissivity=0.0)
+    yarn = design.weave.warp[0]
+    steady = replace(yarn, name="steady", materials=tuple(replace(m, name="steady", tc1=0.0) for m in yarn.materials))
+    design = replace(design, weave=replace(design.weave, weft=(steady,) * 2), probes=design.probes[1:2])
+    study = run_study(design, branches=True)
+    (check,), (record,) = study.branches, study.records
+    assert record.fields[0].resistivity.max() > 1.05  # what the order of coefficients decides
+    assert check.again.currents == pytest.approx(record.currents, rel=ROUTES)
+
+
+def test_what_a_current_warms_is_compared_at_the_temperatures_of_that_current() -> None:
+    """Beyond the largest voltage that a falling resistance takes, the same voltage has another, cooler state."""
+    design = weave(tc1=-METAL, emissivity=0.0)
+    numerics = replace(design.numerics, contact_points=8)
+    design = replace(design, numerics=numerics, probes=(Probe("amperes", "left", "right", current=FALLING),))
+    study = run_study(design, error_estimate=True, branches=True)
+    (record,) = study.records
+    assert run_study(record.driven(design)).records[0].currents[0] < 0.5 * FALLING
+    (check,), (estimate,) = study.branches, study.errors
+    assert check.again.currents == pytest.approx(record.currents, rel=ROUTES)
+    current = estimate.quantity("I amperes")
+    assert current.value == pytest.approx(FALLING, rel=ROUTES)
+    assert 0.0 < current.relative < 0.1
+    assert not estimate.warnings
+
+
 def test_ratings_are_those_of_the_temperatures(heated: Study, linear: Study) -> None:
     """For the design's rise, 10 K, at which radiation and resistances change by some per cent; summary and report."""
     warm, cold = (heating(study, study.records[0]) for study in (heated, linear))
-    area = fabric_area(heated.design, heated.records[0].gradient)
+    area = fabric_area(heated.mesh, heated.records[0].configuration)
     for one, other, field in zip(warm, cold, heated.records[0].fields, strict=True):
         assert one.rated_current == field.rated[1]
         assert one.rated_power_density == pytest.approx(100 * field.rated[2] / area, rel=ROUTES)

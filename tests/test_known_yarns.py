@@ -22,7 +22,7 @@ from circuittex.design import Design, Yarn, design_hash, load_design, parse_desi
 from circuittex.design.files import fabrics
 from circuittex.design.known_yarns import ENTRY_POINTS, FOLDERS, LONGEST, yarn_library
 from circuittex.electrical.fields import cooling_of, solve_probes
-from circuittex.results.heating import heating
+from circuittex.results.heating import fabric_area, heating
 from circuittex.results.records import Study
 from circuittex.results.soundness import doubts
 from circuittex.results.summary import agrees
@@ -367,7 +367,7 @@ def test_steel_heater_conducts_along_its_warp_alone() -> None:
     assert record.currents[0] == pytest.approx(0.01 / (23.8e-3 * length), rel=1e-2)  # radius of three digits
     assert record.fit.kinds == ("heater warp",)
     heater = parse_design(tomllib.loads(starter("steel_heater")) | tomllib.loads(HEATER))
-    driven = at_voltages(heater, record.contacts, record.gradient)
+    driven = at_voltages(heater, record.contacts, fabric_area(record.contacts.mesh, record.configuration))
     cooling = cooling_of(heater, study.mesh)
     fields = solve_probes(record.contacts, driven.terminals, driven.probes, cooling=cooling)
     (heat,) = heating(replace(study, design=heater), replace(record, fields=fields))

@@ -113,6 +113,38 @@ def test_bending_to_a_circle_stresses_the_surface(plane: float) -> None:
     np.testing.assert_allclose(surface_stress(pulled), surface_stress(bent) + 2.0, rtol=1e-14)
 
 
+@pytest.mark.parametrize(("core", "shell"), [(2.5e3, 80e3), (200e3, 50.0)])
+def test_a_coated_fibril_is_stressed_layer_by_layer(core: float, shell: float) -> None:
+    """E_i (epsilon + R_i / rho) in shell and core, epsilon of the force on E_c A_c + E_s A_s; a plating carries more
+    than the mean modulus has it, and a steel core in a soft coat carries nearly all."""
+    record = quiet(STUDY.records[0])
+    rho, strain, bare = 2.0, 1e-3, record.contacts.mesh
+    R = float(bare.radius[0])
+    t, number = 0.02 * R, len(bare.radius)
+    inside = R - t
+    whole = core * inside**2 + shell * (R**2 - inside**2)  # E A / pi
+    bends = np.sqrt((core * inside**4 + shell * (R**4 - inside**4)) / whole)  # 2 sqrt(EI / EA)
+    mesh = replace(
+        bare,
+        youngs_modulus=np.full(number, whole / R**2),
+        bending_radius=np.where(np.arange(number) > 0, bends, R),
+        shell_thickness=np.where(np.arange(number) > 0, t, 0.0),  # the first is bare
+    )
+    angle, x = mesh.xi / rho, np.array(record.configuration.x)
+    x[:, 1] = np.stack([-np.sin(angle), np.cos(angle), 0.0 * angle], axis=1)
+    x[:, 0] = rho * np.stack([np.sin(angle), 1.0 - np.cos(angle), 0.0 * angle], axis=1)
+    force = np.full(len(mesh.elements), strain * np.pi * whole)
+    bent = replace(
+        record, contacts=replace(record.contacts, mesh=mesh), configuration=Configuration(x), section_force=force
+    )
+    arc = np.abs(np.diff(mesh.xi[mesh.elements[:, [0, -1]]], axis=1)).max() / rho
+    known = max(shell * (strain + R / rho), core * (strain + inside / rho))
+    first = mesh.element_fibril == 0
+    found = surface_stress(bent)
+    np.testing.assert_allclose(found[~first], known, rtol=1.01 * arc**2 / 24)
+    np.testing.assert_allclose(found[first], whole / R**2 * (strain + R / rho), rtol=1.01 * arc**2 / 24)
+
+
 def test_a_stretched_fibril_is_not_bent() -> None:
     """E epsilon at its surface, up to the next order in epsilon; the force is that of the beam."""
     record, strain = quiet(STUDY.records[0]), 1e-4

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from circuittex.base.errors import ConvergenceError, DesignError
-from circuittex.design import Design, Packing, Weave
+from circuittex.design import Clamps, Design, Packing, Weave
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
@@ -180,6 +180,33 @@ def test_a_state_moves_the_nodes_of_another_weave_as_its_own(small: tuple[Design
     assert np.array_equal(start.r[there.ends], there.position[there.ends])
 
 
+def test_a_state_whose_clamps_slid_is_a_start_under_forces_alone() -> None:
+    """A similar design under the same forces begins with its clamps where the state has them, and ends where the
+    initial weave leads; one with held clamps cannot."""
+    design, mesh = small_cell((1, 2), elements=8)
+    loose = replace(design, clamps=Clamps(0.2, 0.0))
+    source = relax(mesh, loose).configuration
+    softer = replace(
+        loose, contact=replace(design.contact, penalty=4.0), numerics=replace(design.numerics, elements=12)
+    )
+    there = build_mesh(softer)
+    start = from_state(there, softer, source, mesh)
+    far = there.end_nodes(1)
+    assert np.abs(start.r - there.position)[far].max() > 0.01
+    np.testing.assert_allclose(start.r[far], source.r[mesh.end_nodes(1)], rtol=0, atol=1e-14)
+    direct, found = relax(there, softer), relax(there, softer, start)
+    assert found.iterations < direct.iterations
+    assert found.energy == pytest.approx(direct.energy, rel=1e-4)  # the work of clamps that slide is of first order
+    assert np.abs(found.configuration.r - direct.configuration.r).max() < 0.01 * float(mesh.radius[0])
+    for held in (design, replace(design, clamps=Clamps(warp_force=0.2))):
+        with pytest.raises(DesignError, match="or have slid under a force that this design gives as well"):
+            from_state(mesh, held, source, mesh)
+    askew = source.x.copy()
+    askew[mesh.end_nodes(1)[0], 0, 0] += 1e-6  # one fibril of the yarn
+    with pytest.raises(DesignError, match="or have slid"):
+        from_state(mesh, loose, Configuration(askew), mesh)
+
+
 def test_what_has_no_smaller_cell_is_refused() -> None:
     design, mesh = small_cell((1,), yarns=2)
     with pytest.raises(DesignError, match=r"start: 'tiled' is not usable; the draft of 2 x 2 yarns is no whole number"):
@@ -198,8 +225,12 @@ def test_the_error_of_a_cell_without_equilibrium_says_whose_it_is() -> None:
 def test_states_of_other_yarns_or_under_strain_are_refused(small: tuple[Design, FibrilMesh, Equilibrium]) -> None:
     design, mesh, source = small
     other, there = small_cell((1, 2))
-    with pytest.raises(DesignError, match=r"as many fibrils as this design's: \[1, 1, 1, 1\], \[3, 3, 3, 3\]"):
+    with pytest.raises(DesignError, match=r"this design's, warp and weft: \[1, 1\] and \[1, 1\], \[3, 3\] and"):
         from_state(there, other, source.configuration, mesh)
+    tall, wide = (with_draft(design, draft) for draft in (((0,), (1,), (0,)), ((0, 1, 0),)))
+    ends = initial_configuration(build_mesh(wide))  # of four yarns as well, but of one warp and three weft
+    with pytest.raises(DesignError, match=r"warp and weft: \[1\] and \[1, 1, 1\], \[1, 1, 1\] and \[1\]"):
+        from_state(build_mesh(tall), tall, ends, build_mesh(wide))
     strained = source.configuration.x.copy()
     strained[:, 0, 0] *= 1.01
     with pytest.raises(DesignError, match="a relaxed state, without strain"):

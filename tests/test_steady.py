@@ -106,6 +106,28 @@ def test_a_fibril_of_one_temperature(stated: str, tc1: float, tc2: float) -> Non
         assert found.currents[0] == pytest.approx(drive, rel=ROUNDING)
 
 
+@pytest.mark.parametrize("stated", DRIVES)
+def test_a_fibril_of_one_temperature_however_little_leaves(stated: str) -> None:
+    """Surfaces that take 16 decades less than a segment conducts, and as much less power: no runaway, but that rise."""
+    part, state = 1e-12, straight(elements=500)
+    drive = DRIVES[stated] * (1.0 if stated == "power_density" else np.sqrt(part))
+    found = solve_steady(
+        state,
+        ENDS,
+        along(**{stated: drive}),
+        following(state, 0.004),
+        cooling=surfaces(state, part * H),
+        area=part,
+        rise=10.0,
+    )
+    power = found.voltage * found.currents[0]
+    T = power / (SURFACE * part * H)
+    assert T > 20.0
+    np.testing.assert_allclose(found.temperature[found.fibril == 0], T, rtol=ROUNDING)
+    assert found.voltage / found.currents[0] == pytest.approx(WHOLE * (1 + 0.004 * T), rel=ROUNDING)
+    assert found.rated[2] == pytest.approx(SURFACE * part * H * 10.0, rel=ROUNDING)
+
+
 def test_a_coated_fibril_of_one_temperature() -> None:
     """Core and shell side by side, of which the shell carries a third when cold: each resists as it is warm."""
     state, (tc1, tc2), (shell1, shell2), w, volts = straight(), (0.005, 0.0), (-0.003, 4e-6), 1 / 3, DRIVES["voltage"]
@@ -308,7 +330,7 @@ def test_below_the_fold_a_voltage_has_the_colder_of_two_states() -> None:
         )  # near the fold rounding counts 1 / sqrt(2e-3) times
 
 
-@pytest.mark.parametrize("times", [1.002, 50.0])
+@pytest.mark.parametrize("times", [1.002, 50.0, 1e5])
 def test_past_the_fold_a_voltage_is_refused(times: float) -> None:
     """And the error says where the fold is: it lies within four of the shortest steps, 0.1 % of the square each."""
     with pytest.raises(DesignError, match=r"probes\.along\.voltage.*thermal runaway") as refused:
@@ -375,6 +397,9 @@ def test_the_rated_current_of_a_fibril_of_one_temperature(tc1: float) -> None:
         assert found.rated.tolist() == pytest.approx(
             [T, np.sqrt(leaves(T) / (WHOLE * (1 + tc1 * T))), leaves(T)], rel=ROUNDING
         )
+    if tc1 < 0.0:  # 1 + tc1 T is negative there
+        beyond = solve_steady(state, ENDS, along(voltage=1e-3), following(state, tc1), cooling=cooling, rise=-1.1 / tc1)
+        assert np.isnan(beyond.rated[1:]).all()
     idle = (ENDS[0], Terminal("far", (("warp2", 1),)))
     nothing = Probe("apart", "one", "far", 1.0)
     assert np.isnan(solve_steady(state, idle, nothing, following(state, tc1), cooling=cooling, rise=T).rated[1:]).all()

@@ -14,6 +14,7 @@ from math import inf
 from textwrap import wrap
 from typing import Any
 
+from circuittex.base.errors import DesignError
 from circuittex.design.checks import name as checked_name
 from circuittex.design.checks import one_of, real, refuse, store, truth, whole
 from circuittex.design.table import Table, quantity
@@ -70,7 +71,15 @@ def number(
         return real(value, field, shown_unit, above=above, at_least=at_least, at_most=at_most)
 
     def read(value: object, field: str) -> object:
-        return value if isinstance(value, str) and value in words else quantity(value, unit, field)
+        if isinstance(value, str) and value in words:
+            return value
+        try:
+            return quantity(value, unit, field)
+        except DesignError as error:
+            if not words:
+                raise
+            allowed = f"{error.allowed}, or {' or '.join(map(repr, words))}"
+            raise DesignError(error.field, error.value, allowed) from None
 
     wanted = "a plain number" if unit == "1" else f"a number in {unit} or a string with a unit"
     limits = [f"> {above:g}"] * (above > -inf) + [f">= {at_least:g}"] * (at_least > -inf)

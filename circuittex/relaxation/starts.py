@@ -1,7 +1,8 @@
 """Where the first relaxation of a weave may start, other than from the initial weave.
 
-Each start is the initial weave with displacements added that are zero at the clamped ends: those of a smaller cell,
-over and over, or those of a state of a similar design. What the descent from there reaches is asked the same as ever.
+Each start is the initial weave with displacements added that are zero at ends whose clamps are held: those of a smaller
+cell, over and over, or those of a state of a similar design. What the descent from there reaches is asked the same as
+ever.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from circuittex.base.arrays import Ints
+from circuittex.base.arrays import Floats, Ints
 from circuittex.base.errors import ConvergenceError, DesignError, PenetrationError
 from circuittex.design import Clamps, Design, Weave
 from circuittex.design.statement import AUTO
@@ -19,10 +20,13 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.mech.linear import LinearSolver
+from circuittex.relaxation.clamps import sliding
 from circuittex.relaxation.relax import force_terms, relax
 from circuittex.relaxation.sides import REST, check_sides
 from circuittex.relaxation.transfer import field_at, transfer
 
+ROUNDING = 1e-12
+"""Parts of a fibril's length by which the ends of a yarn that slid side by side may differ."""
 START = "start"
 """What the starts are called in messages: the argument of `run_study` and the option of the command."""
 
@@ -148,20 +152,49 @@ def _original(mesh: FibrilMesh, cell: FibrilMesh) -> Ints:
 def from_state(mesh: FibrilMesh, design: Design, state: Configuration, source: FibrilMesh) -> Configuration:
     """The start with the displacements, from its own initial weave, of a relaxed `state` of a similar weave.
 
-    `source` is the mesh of the state, with as many fibrils in the same yarns and any elements. Materials, radii,
-    pitches and the contact may be others.
+    `source` is the mesh of the state, with as many warp and weft yarns, as many fibrils in each and any elements.
+    Materials, radii, pitches and the contact may be others. Where a design gives clamps a force, they may have slid.
 
     Raises `DesignError` where it cannot be a start of this design (`check_start`).
     """
-    if not np.array_equal(source.yarn, mesh.yarn):
-        counts = ", ".join(f"{np.bincount(of.yarn).tolist()}" for of in (source, mesh))
-        raise DesignError(START, "state", f"its yarns must have as many fibrils as this design's: {counts}")
+    counts = [[np.bincount(of.yarn)[of.yarn_axis == axis].tolist() for axis in (0, 1)] for of in (source, mesh)]
+    if counts[0] != counts[1]:
+        (warp, weft), (own_warp, own_weft) = counts
+        raise DesignError(
+            START,
+            "state",
+            "its yarns must have as many fibrils as this design's, warp and weft: "
+            f"{warp} and {weft}, {own_warp} and {own_weft}",
+        )
     moved = Configuration(state.x - initial_configuration(source).x)
-    if np.any(moved.r[source.ends]):
-        raise DesignError(START, "state", "its clamps must be where they were woven: a relaxed state, without strain")
-    start = Configuration(initial_configuration(mesh).x + transfer(moved, source, mesh).x)
+    slid = _slid(moved, source, design)
+    x = initial_configuration(mesh).x + transfer(moved, source, mesh).x
+    moving = sliding(mesh, design, "xy")
+    if moving is not None:  # side by side to the last digit, as the relaxation keeps them
+        rows, origin = moving.motions.unknown, initial_configuration(mesh).x.ravel()
+        x.ravel()[rows] = origin[rows] + moving.motions.part * slid[moving.motions.motion]
+    start = Configuration(x)
     check_start(mesh, design, start, "state")
     return start
+
+
+def _slid(moved: Configuration, source: FibrilMesh, design: Design) -> Floats:
+    """(K,) how far the clamps of each yarn for which the design gives a force have slid; DesignError where any end has
+    been displaced otherwise."""
+    left, slid = moved.x.copy(), np.empty(0)
+    moving = sliding(source, design, "xy")
+    if moving is not None:
+        motions = moving.motions
+        slid = moved.x.ravel()[motions.leader]
+        rest = left.ravel()[motions.unknown] - motions.part * slid[motions.motion]
+        left.ravel()[motions.unknown] = np.where(np.abs(rest) > ROUNDING * source.length.max(), rest, 0.0)
+    if np.any(left[source.ends, 0]):
+        allowed = (
+            "its clamps must be where they were woven, or have slid under a force that this design gives as well: a "
+            "relaxed state, without strain"
+        )
+        raise DesignError(START, "state", allowed)
+    return slid
 
 
 def check_start(mesh: FibrilMesh, design: Design, start: Configuration, which: str) -> None:

@@ -32,9 +32,16 @@ def extensions(mesh: FibrilMesh, configuration: Configuration) -> Floats:
     >>> extensions(mesh, initial_configuration(mesh)).tolist()
     [0.0, 0.0, 0.0, 0.0]
     """
-    now, laid_out = (np.hypot(*_apart(mesh, r).T) for r in (configuration.r, mesh.position))
+    now, laid_out = (np.hypot(*end_to_end(mesh, r).T) for r in (configuration.r, mesh.position))
     strain: Floats = now / laid_out - 1.0
     return strain
+
+
+def end_to_end(mesh: FibrilMesh, r: Floats) -> Floats:
+    """(Y, 2) the way in the plane from the minus to the plus end of each yarn, mm: the mean of its fibrils' at nodes r
+    (N, 3)."""
+    way: Floats = _apart(mesh, r) / np.bincount(mesh.yarn, minlength=len(mesh.yarn_axis))[:, None]
+    return way
 
 
 def _apart(mesh: FibrilMesh, of_node: Floats) -> Floats:

@@ -9,6 +9,9 @@ from circuittex.base.frozen import frozen
 from circuittex.design import Design
 from circuittex.design.probe import PER_CM2
 from circuittex.electrical.fields import Fields
+from circuittex.geometry.mesh import FibrilMesh
+from circuittex.mech.configuration import Configuration
+from circuittex.results.clamps import end_to_end
 from circuittex.results.records import Record, Study
 
 
@@ -29,7 +32,8 @@ class Heating:
     voltage: float
     """Of the source above the sink, V."""
     rated_current: float
-    """The current at which the largest rise is the rated one, A; nan where nothing is warmed, and so the next two."""
+    """The current at which the largest rise is the rated one, A; nan where nothing is warmed, or nothing warms by that
+    (a resistance that would have to be negative), and so the next two."""
     rated_power: float
     """The power that the source feeds in then, V I, W."""
     rated_power_density: float
@@ -52,22 +56,23 @@ class Heating:
 
 def heating(study: Study, record: Record) -> tuple[Heating, ...]:
     """The heat of each probe, and its ratings for the rise that the design states (`Electrical.rated_rise`)."""
-    area = fabric_area(study.design, record.gradient)
+    area = fabric_area(study.mesh, record.configuration)
     return tuple(_heating(field, area, study.design.electrical.rated_rise) for field in record.fields)
 
 
 def _heating(field: Fields, area: float, rise: float) -> Heating:
     current, power = rating(field, rise)
+    each = PER_CM2 / area if area > 0.0 else float("nan")  # a free yarn may have turned back on itself
     return Heating(
         probe=field.probe,
         power=field.heat,
-        power_density=PER_CM2 * field.heat / area,
+        power_density=each * field.heat,
         along=field.heat_lost / field.heat if field.heat > 0.0 else float("nan"),
         rise=field.peak_temperature,
         voltage=field.voltage,
         rated_current=current,
         rated_power=power,
-        rated_power_density=PER_CM2 * power / area,
+        rated_power_density=each * power,
     )
 
 
@@ -76,15 +81,22 @@ def driven_otherwise(design: Design) -> tuple[int, ...]:
     return tuple(number for number, probe in enumerate(design.probes) if not probe.voltage)
 
 
-def fabric_area(design: Design, gradient: Floats) -> float:
-    """Area of the cell at an average in-plane gradient, mm2: its spans, times the determinant.
+def fabric_area(mesh: FibrilMesh, configuration: Configuration) -> float:
+    """Area of the cell in its plane, mm2: of the parallelogram of the mean ways from end to end of warp and of weft.
+
+    Where all clamps are held these are its spans, times the determinant of the average gradient; clamps that slide
+    under a force, and edges that were let go, count where they are.
 
     >>> from circuittex.design import plain_weave
-    >>> round(fabric_area(plain_weave(), np.diag([1.25, 1.0])), 12)
-    80.0
+    >>> from circuittex.geometry.weave import build_mesh
+    >>> from circuittex.mech.configuration import initial_configuration
+    >>> mesh = build_mesh(plain_weave())
+    >>> round(fabric_area(mesh, initial_configuration(mesh)), 12)
+    64.0
     """
-    warps, wefts = design.weave.directions
-    return warps.crossings * warps.step * wefts.crossings * wefts.step * float(np.linalg.det(gradient))
+    ways = end_to_end(mesh, configuration.r)
+    warp, weft = (ways[mesh.yarn_axis == axis].mean(axis=0) for axis in (0, 1))
+    return abs(float(warp[0] * weft[1] - warp[1] * weft[0]))
 
 
 def rating(field: Fields, rise: float) -> tuple[float, float]:
@@ -92,7 +104,7 @@ def rating(field: Fields, rise: float) -> tuple[float, float]:
 
     The equations of a probe are linear and its heat is quadratic in the voltage: the rise goes with the square of
     voltage and current, hence by sqrt(rise / peak). Where they are not linear these were solved for with the fields,
-    for one rise. nan where nothing is warmed, and for other rises than that.
+    for one rise. nan where nothing is warmed, or nothing warms by that, and for other rises than that.
     """
     current = float(field.currents[0])
     if len(field.rated):

@@ -39,7 +39,7 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
         of each probe: ``voltage_V``, ``power_W``, ``power_density_W_cm2`` of the fabric, ``peak_temperature_K``,
         ``along_yarns``, the part of the heat that leaves along the yarns rather than at their ends, and
         ``rated_current_A``, ``rated_power_W``, ``rated_power_density_W_cm2``: what the source may feed in for the
-        hottest point to rise by ``rated_rise`` of the parameters (``electrical``), null where nothing is warmed
+        hottest point to rise by ``rated_rise`` of the parameters (``electrical``), null where nothing is warmed by it
     ``Ry_ohm``, ``Rc_ohm``, ``fit_residual``, ``fit_warnings``, ``network``, ``ports``
         the reduced network, its misfit, and what the fit warns of; ``Ry_ohm`` is null where there are several kinds of
         yarn, ``network`` has ``fitted_to``, ``Ry_ohm`` of each kind, ``Rc_ohm`` of each pair of kinds that cross,
@@ -49,10 +49,10 @@ The file is strict JSON; a number that is undefined (nan) or infinite is null. K
         contact points at full resolution; levels in which the fibrils of the centre warp yarn lie at its centre
         crossing
     ``deepest_overlap``, ``largest_stress_MPa``
-        the deepest overlap of two fibrils over R + R', and the largest force of a section over its reference area
+        the deepest overlap of two fibrils over R + R', and the largest axial stress, bending included, of core or shell
     ``doubts``
-        why the state cannot be right or trusted, in sentences: overlaps, stresses, temperatures, the mesh, probes that
-        cannot be driven as stated; empty if all is well
+        why the state cannot be right or trusted, in sentences: overlaps, stresses, temperatures, heat, the mesh, probes
+        that cannot be driven as stated; empty if all is well
     ``netlist``
         path of the detailed netlist, relative to the folder of the file
     ``error_estimate``

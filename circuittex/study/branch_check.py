@@ -21,7 +21,7 @@ from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.permutation import permuted
 from circuittex.mech.configuration import Configuration
 from circuittex.mech.linear import LinearSolver
-from circuittex.relaxation.relax import relax
+from circuittex.relaxation.relax import Equilibrium, relax
 from circuittex.results.bifurcation import ALLOWED, SETTLED, BranchCheck, difference
 from circuittex.results.outcome import Outcome
 from circuittex.results.records import Record, Study
@@ -73,17 +73,17 @@ def check_branch(
     equilibrium is a result and no error. `solver` makes the linear solver of each relaxation; `say` is told of the
     progress.
     """
-    mesh, design = study.mesh, record.driven(study.design)  # currents at the same voltages tell branches apart
+    mesh, design = study.mesh, study.design
     other, nodes = permuted(mesh, another_permutation(mesh.n_fibrils))
     shuffled = replace(study, mesh=other, initial=Configuration(study.initial.x[nodes]))
     try:
         found = reach(
             shuffled, step, Configuration(start.x[nodes]), solver, lambda text: say(f"branch check, {text}")
         ).equilibrium
+        again = outcome_of(design, mesh, _in_order(found, nodes), record)
     except ConvergenceError as error:
         nothing = Outcome(np.full((2, 3), nan), (nan,) * len(design.probes), nan, nan, nan)
         return BranchCheck(record.name, record.outcome, nothing, nan, (), str(error))
-    again = outcome_of(design, other, found)
     moved = float(np.linalg.norm(found.configuration.r - record.configuration.r[nodes], axis=1).max())
     settled: tuple[Outcome, ...] = ()
     trouble = ""
@@ -91,26 +91,35 @@ def check_branch(
     if difference(record.outcome, again) > ALLOWED and max(record.residual, found.residual) > least:
         say(f"branch check, {record.name}: relaxing both states further")
         try:
-            settled = (
-                _settle(design, mesh, record.configuration, step, least, solver()),
-                _settle(design, other, found.configuration, step, least, solver()),
-            )
+            one = _settled(design, mesh, record.configuration, step, least, solver())
+            two = _settled(design, other, found.configuration, step, least, solver())
+            settled = tuple(outcome_of(design, mesh, each, record) for each in (one, _in_order(two, nodes)))
         except ConvergenceError as error:
             trouble = str(error)
     return BranchCheck(record.name, record.outcome, again, moved, settled, trouble)
 
 
-def _settle(
+def _in_order(found: Equilibrium, nodes: Ints) -> Equilibrium:
+    """An equilibrium of the fibrils in another order, in which `nodes` (N,) were numbered so, in their own order; its
+    sections are left out.
+
+    A design states its materials in that order, and contacts do not know of another.
+    """
+    x, reaction = np.empty_like(found.configuration.x), np.empty_like(found.reaction)
+    x[nodes], reaction[nodes] = found.configuration.x, found.reaction
+    return replace(found, configuration=Configuration(x), reaction=reaction, section_force=np.empty((0, 3)))
+
+
+def _settled(
     design: Design, mesh: FibrilMesh, state: Configuration, step: Step, tolerance: float, solver: LinearSolver
-) -> Outcome:
-    """What the state comes to when it is relaxed on to a smaller tolerance (N).
+) -> Equilibrium:
+    """The state relaxed on to a smaller tolerance (N).
 
     Raises `ConvergenceError` where round-off does not allow that.
     """
     if tolerance == 0.0:
         raise ConvergenceError("the clamps carry no force that the residual could be measured by")
     sharp = replace(design, numerics=replace(design.numerics, tolerance=f"{tolerance!r} N"))
-    found = relax(
+    return relax(
         mesh, sharp, state, gradient=step.after, free_edges=step.free_edges, gripped=step.gripped, solver=solver
     )
-    return outcome_of(sharp, mesh, found)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import sqrt
 
-from circuittex.base.arrays import Floats
 from circuittex.base.errors import CircuitError
 from circuittex.contact.state import ContactState
 from circuittex.design import Design, Probe
@@ -22,7 +21,6 @@ from circuittex.electrical.fields import (
 from circuittex.electrical.network.circuit import Circuit
 from circuittex.electrical.network.nodal import solve_nodal
 from circuittex.electrical.network.one_pair import yarn_conductance
-from circuittex.results.heating import fabric_area
 from circuittex.study.circuits import probe_circuits
 
 SMALL = 1e-6
@@ -33,8 +31,8 @@ NOTHING = 1e-12
 """A probe with less than this part of a yarn's conductance carries no current: it is rounding of the solution."""
 
 
-def at_voltages(design: Design, contacts: ContactState, gradient: Floats) -> Design:
-    """The design with all probes driven by voltages, as a state of average `gradient` asks for.
+def at_voltages(design: Design, contacts: ContactState, area: float) -> Design:
+    """The design with all probes driven by voltages, as a state asks for whose fabric has this `area`, mm2.
 
     The circuit is linear: with the current G at 1 V, the voltage is I / G for a stated current I, and sqrt(P S / G) for
     a stated power P for each area of the fabric, S. Where no current flows, or `HIGHEST_VOLTAGE` would not suffice, the
@@ -46,7 +44,7 @@ def at_voltages(design: Design, contacts: ContactState, gradient: Floats) -> Des
     unit = replace(design, probes=tuple(probe.at(1.0) for probe in others))
     solved = solve_potentials(contacts, unit.terminals, unit.probes)
     conductance = told_currents(solved, probe_circuits(contacts, unit.terminals, unit.probes), unit)
-    area, least = fabric_area(design, gradient), NOTHING * yarn_conductance(design)
+    least = NOTHING * yarn_conductance(design)
     volts = {
         probe.name: _voltage(probe, siemens, area) if siemens > least else 1.0
         for probe, siemens in zip(others, conductance, strict=True)

@@ -88,7 +88,6 @@ def estimate_error(
 
     Raises `DesignError` as `variants` does.
     """
-    design = record.driven(design)  # errors of currents at the same voltages, where a current is stated as well
     loading = next((loading for loading in design.loading if loading.name == record.loading), None)
     repeats = []
     for words, other in zip(VARIANTS, variants(design), strict=True):
@@ -138,11 +137,12 @@ def _repeat(design: Design, mesh: FibrilMesh, record: Record, loading: Loading |
             gripped=gripped(loading) if loading else "",
             solver=solver,
         )
+        values = _values(outcome_of(design, other, found, record))
     except ConvergenceError as error:
         return _Repeat(np.full(len(_names(design)), nan), nan, str(error))
     back = transfer(found.configuration, other, mesh)
     moved = float(np.linalg.norm(back.r - state.r, axis=1).max())
-    return _Repeat(_values(outcome_of(design, other, found)), moved, "")
+    return _Repeat(values, moved, "")
 
 
 def _names(design: Design) -> tuple[tuple[str, str], ...]:

@@ -106,8 +106,9 @@ def record_state(study: Study, step: Step, reached: Increment, say: Callable[[st
     mesh, equilibrium = study.mesh, reached.equilibrium
     contacts = contacts_of(study.design, mesh, equilibrium.configuration)
     check_sound(study, step, equilibrium.configuration.r, contacts)
-    design = at_voltages(study.design, contacts, step.after)
-    cold, fields = _fields(study.design, design, contacts, step)
+    area = fabric_area(mesh, equilibrium.configuration)
+    design = at_voltages(study.design, contacts, area)
+    cold, fields = _fields(study.design, design, contacts, area, step.name)
     circuits = circuits_of(design, contacts, fields)
     whole = probe_circuits(contacts, design.terminals, design.probes)
     ports = port_matrix(circuits.conducting)
@@ -167,7 +168,7 @@ def _verified(
 
 
 def _fields(
-    stated: Design, design: Design, contacts: ContactState, step: Step
+    stated: Design, design: Design, contacts: ContactState, area: float, state: str
 ) -> tuple[Sequence[Potential], tuple[Fields, ...]]:
     """The potentials of the probes at 27 C, as the fit wants them, and the fields: the same where these are linear.
 
@@ -177,9 +178,9 @@ def _fields(
     if electrical.heating == NONLINEAR:
         cold = solve_potentials(contacts, design.terminals, design.probes)
         try:
-            return cold, steady_fields(stated, design, contacts, cold, fabric_area(design, step.after))
+            return cold, steady_fields(stated, design, contacts, cold, area)
         except DesignError as error:
-            raise DesignError(error.field, error.value, f"in the state {step.name!r} {error.allowed}") from error
+            raise DesignError(error.field, error.value, f"in the state {state!r} {error.allowed}") from error
     fields = solve_probes(
         contacts,
         design.terminals,
@@ -190,16 +191,36 @@ def _fields(
     return fields, fields
 
 
-def outcome_of(design: Design, mesh: FibrilMesh, equilibrium: Equilibrium) -> Outcome:
-    """The numbers of an equilibrium and nothing else, for one that is not recorded; probes are driven by voltages."""
-    contacts = contacts_of(design, mesh, equilibrium.configuration)
-    cold: Sequence[Potential] = solve_potentials(contacts, design.terminals, design.probes)
-    fields = steady_fields(design, design, contacts, cold) if design.electrical.heating == NONLINEAR else cold
-    currents = tuple(float(field.currents[0]) for field in fields)
+def outcome_of(design: Design, mesh: FibrilMesh, equilibrium: Equilibrium, record: Record) -> Outcome:
+    """The numbers of another equilibrium of the state of `record`, and nothing else: currents at the voltages that the
+    probes have there.
+
+    Where resistances follow the temperatures these are those that a probe makes as it is stated: what a current warms
+    may have another steady state at its voltage, or none.
+
+    Raises `ConvergenceError` where there is no steady state.
+    """
+    contacts, driven = contacts_of(design, mesh, equilibrium.configuration), record.driven(design)
+    cold = solve_potentials(contacts, driven.terminals, driven.probes)
+    currents = tuple(float(field.currents[0]) for field in cold)
+    if design.electrical.heating == NONLINEAR:
+        currents = _warm_currents(design, contacts, fabric_area(mesh, equilibrium.configuration), record)
     merged = simplified(design, contacts).contacts
-    told = told_currents(cold, probe_circuits(contacts, design.terminals, design.probes), design)
-    fit = fit_network(told, design, port_matrix(build_circuit(merged, conducting_ends(mesh))))
+    told = told_currents(cold, probe_circuits(contacts, driven.terminals, driven.probes), driven)
+    fit = fit_network(told, driven, port_matrix(build_circuit(merged, conducting_ends(mesh))))
     return outcome(clamp_force(mesh, equilibrium.reaction), currents, fit, equilibrium.energy)
+
+
+def _warm_currents(design: Design, contacts: ContactState, area: float, record: Record) -> tuple[float, ...]:
+    """The currents, A, at the voltages of a record through the resistances at the temperatures of the probes."""
+    cold = at_voltages(design, contacts, area)
+    potentials = solve_potentials(contacts, cold.terminals, cold.probes)
+    try:
+        fields = steady_fields(design, cold, contacts, potentials, area)
+    except DesignError as error:
+        raise ConvergenceError(str(error)) from error
+    pairs = zip(fields, record.fields, strict=True)
+    return tuple(float(field.currents[0]) * (there.voltage / field.voltage) for field, there in pairs)
 
 
 def centre_crossing(design: Design) -> tuple[int, float]:

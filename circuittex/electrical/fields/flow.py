@@ -16,11 +16,8 @@ from circuittex.base.frozen import frozen
 from circuittex.contact.state import ContactState
 from circuittex.design import Probe, Terminal
 from circuittex.electrical.fields.line import FibrilLine
-from circuittex.electrical.fields.system import System, balance, build_system, constant_source
+from circuittex.electrical.fields.system import WEAK, System, balance, build_system, constant_source, stiffest
 from circuittex.geometry.mesh import FibrilMesh
-
-WEAK = 1e-10
-"""Contacts of a fibril this much weaker than a segment keep six digits in the matrix, which is enough to refine."""
 
 
 def electric_conductance(contacts: ContactState) -> Floats:
@@ -98,10 +95,7 @@ def _anchor(contacts: ContactState, line: FibrilLine, held: NDArray[np.bool_]) -
     n = len(held)
     G = electric_conductance(contacts)
     hung = np.bincount(contacts.fibril_a, G, n) + np.bincount(contacts.fibril_b, G, n)
-    segment = np.zeros(n)
-    length = np.diff(line.xi[line.segments], axis=1)[:, 0]
-    np.maximum.at(segment, line.fibril[line.segments[:, 0]], line.conduction / length)
-    afloat = ~held & (hung < WEAK * segment)
+    afloat = ~held & (hung < WEAK * stiffest(line, line.conduction))
     if not afloat.any():
         return None
     anchor: Ints = np.where(afloat[line.fibril], line.ends[0][line.fibril], np.arange(len(line.fibril)))

@@ -18,7 +18,16 @@ from circuittex.design import Probe, Terminal
 from circuittex.electrical.fields.cooling import COLD_ENDS, Cooling
 from circuittex.electrical.fields.flow import Flow, flows_of, joule_heat
 from circuittex.electrical.fields.line import FibrilLine, fibril_line
-from circuittex.electrical.fields.system import System, balance, build_system, outflow, peak, surface_loss
+from circuittex.electrical.fields.system import (
+    WEAK,
+    System,
+    balance,
+    build_system,
+    outflow,
+    peak,
+    stiffest,
+    surface_loss,
+)
 
 Mesh = Literal["feet", "mechanical"]
 """Nodes at the feet of the contacts, or those of the mechanics."""
@@ -134,7 +143,8 @@ def solve_probes(
     if len(cooling.loss) or not held:
         thermal = replace(thermal, loss=surface + through)
     inside = np.delete(every, line.ends) if held else every
-    temperatures = balance(thermal, loads, np.zeros(loads.shape[1]), inside)
+    anchor = None if held else thermal_anchor(line, thermal)
+    temperatures = balance(thermal, loads, np.zeros(loads.shape[1]), inside, anchor)
     return tuple(
         fields_of(line, thermal, surface, cooling, *one) for one in zip(probes, flows, loads, temperatures, strict=True)
     )
@@ -165,6 +175,20 @@ def losses(line: FibrilLine, thermal: System, cooling: Cooling) -> tuple[Any, An
         ends = line.ends.ravel()
         through = csr_matrix((np.tile(cooling.end, 2), (ends, ends)), shape=(n, n))
     return surface, through, not len(cooling.end)
+
+
+def thermal_anchor(line: FibrilLine, thermal: System) -> Ints | None:
+    """(N,) the dof at the start of each fibril whose ends are not held and from which next to nothing leaves, else the
+    dof itself: what `balance` asks for."""
+    owner, dofs = line.fibril[line.segments[:, 0]], thermal.basis.element_dofs
+    fibril = np.empty(thermal.basis.N, dtype=np.int64)
+    fibril[dofs] = owner
+    leaves = np.bincount(fibril, np.asarray(thermal.loss.sum(axis=1)).ravel(), len(line.ends[0]))
+    weak = leaves < WEAK * stiffest(line, line.thermal)
+    if not weak.any():
+        return None
+    anchor: Ints = np.where(weak[fibril], line.ends[0][fibril], np.arange(len(fibril)))
+    return anchor
 
 
 def line_of(contacts: ContactState, mesh: Mesh, elements: bool = False) -> tuple[FibrilLine, MeshLine]:

@@ -19,8 +19,8 @@ from circuittex.electrical.fields.coefficients import Coefficients
 from circuittex.electrical.fields.cooling import Cooling
 from circuittex.electrical.fields.flow import Flow, electric_conductance, flow_of, joule_heat
 from circuittex.electrical.fields.line import FibrilLine
-from circuittex.electrical.fields.solution import Fields, Mesh, fields_of, line_of, losses
-from circuittex.electrical.fields.system import System, build_system, outflow, peak
+from circuittex.electrical.fields.solution import Fields, Mesh, fields_of, line_of, losses, thermal_anchor
+from circuittex.electrical.fields.system import System, build_system, measured, outflow, peak
 from circuittex.electrical.fields.tangent import (
     Resistors,
     Tangent,
@@ -42,6 +42,8 @@ PEAK = 1e-9
 """Relative difference of the largest rise from the one for which current and power are rated."""
 LEAST = 1e-3
 """Step of the drive, in parts of what has been reached, that is not halved further."""
+NONE = 1e-20
+"""Part of what is wanted below which nothing is looked for: 100 kV in place of 10 uV."""
 EXPONENTS = {"voltage": 0, "power_density": 1, "current": 2}
 """n in p G^n = const for what is stated of a probe: p = V^2 itself, the power p G, or the square of the current."""
 
@@ -117,14 +119,14 @@ def _raised(step: Callable[[float, _State], _State | None], state: _State) -> tu
             reached, state, size = part, found, 2.0 * size
             continue
         size = 0.25 * (part - reached)
-        if size < LEAST * max(reached, LEAST):
+        if size < max(LEAST * reached, NONE):
             break
     return reached, state
 
 
 def _rated(problem: _Problem, T: Floats, power: float, rise: float) -> Floats:
     """(3,) that rise of the hottest point, and current and power that the source feeds in then, K, A, W; nan where
-    nothing is warmed. From a solution T (N,) at the square of a voltage, `power`.
+    nothing is warmed, or not by that. From a solution T (N,) at the square of a voltage, `power`.
 
     The hottest dof has what makes the hottest point, which lies beside it, rise by that.
     """
@@ -194,6 +196,13 @@ class _Problem:
     def resistors(self) -> Resistors:
         elements = len(self.contacts.mesh.elements)
         return resistors_of(self.line, self.electric, self.thermal, self.coefficients, self.contact_heat, elements)
+
+    @cached_property
+    def anchor(self) -> Ints | None:
+        """From which dof the temperature of each is measured (`thermal_anchor`)."""
+        _, cold = radiated(self.thermal.basis, self.radiating, np.zeros(self.thermal.basis.N))
+        leaves = replace(self.thermal, loss=self.thermal.loss + cold)
+        return thermal_anchor(self.line, leaves) if len(self.cooling.end) else None
 
     @cached_property
     def inside(self) -> Ints:
@@ -284,18 +293,18 @@ def _correction(
     resistors, inside = problem.resistors, at.inside
     away, more = radiated(problem.thermal.basis, problem.radiating, T)
     residual = outflow(problem.thermal, T) + away - power * (resistors.warms @ at.heat)
-    cooling = problem.thermal.stiffness + problem.thermal.loss + more
+    move, cooling = measured(replace(problem.thermal, loss=problem.thermal.loss + more), problem.anchor)
     exponent = EXPONENTS[problem.probe.stated] if at.heat.any() else 0
     try:
         # COLAMD's factors have five to six times the entries: the pattern is nearly symmetric.
-        matrix = splu(linearised(resistors, at, cooling, power, exponent, hot), permc_spec="MMD_AT_PLUS_A")
+        matrix = splu(linearised(resistors, at, cooling, move, power, exponent, hot), permc_spec="MMD_AT_PLUS_A")
     except RuntimeError:  # singular: at a fold
         return None
     right = np.zeros(matrix.shape[0])
-    right[len(at.free) : len(at.free) + len(inside)] = -residual[inside]
+    right[len(at.free) : len(at.free) + len(inside)] = -(move.T @ residual)[inside]
     if hot is not None:
         right[-1] = rise - T[hot]
     solution = matrix.solve(right)
     correction = np.zeros(len(T))
     correction[inside] = solution[len(at.free) : len(at.free) + len(inside)]
-    return correction, 0.0 if hot is None else float(solution[-1])
+    return move @ correction, 0.0 if hot is None else float(solution[-1])

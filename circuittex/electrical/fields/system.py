@@ -14,6 +14,8 @@ from circuittex.base.arrays import Floats, Ints
 from circuittex.base.frozen import frozen
 from circuittex.electrical.fields.line import FibrilLine
 
+WEAK = 1e-10
+"""What holds a fibril this much weaker than a segment keeps six digits in the matrix, which is enough to refine."""
 REFINEMENTS = 2
 """Steps of iterative refinement, which win back what short elements lose in the assembled matrix."""
 
@@ -68,6 +70,13 @@ def build_system(basis: Any, line: FibrilLine, coefficient: Floats, conductance:
     return System(basis, along, conductance, csr_matrix(_conduction.assemble(basis, coefficient=along)), foot, jump)
 
 
+def stiffest(line: FibrilLine, conduction: Floats) -> Floats:
+    """(F,) conductance of the shortest segment of each fibril, `conduction` (S,) over its length."""
+    found, length = np.zeros(line.ends.shape[1]), np.diff(line.xi[line.segments], axis=1)[:, 0]
+    np.maximum.at(found, line.fibril[line.segments[:, 0]], conduction / length)
+    return found
+
+
 def surface_loss(basis: Any, density: Floats) -> Any:
     """(N, N) loss to the surroundings of `density` (S,) per length of axis."""
     return csr_matrix(_mass.assemble(basis, density=basis.with_element(ElementLineP0()).interpolate(density)))
@@ -114,20 +123,18 @@ def balance(system: System, load: Floats, value: Floats, free_dofs: Ints, anchor
     """Balance `load` (n, N) in the dofs `free_dofs`; elsewhere x is `value` (N,), and 0 where that is nan.
 
     A fibril that hangs on its contacts alone moves as a whole, and where these are ten decades weaker than its
-    segments, nothing of them is left in the assembled matrix. `anchor` (N,) names for each dof the one on its fibril
-    from which it is measured, or itself: then the segments' part in the anchor's row is zero by construction, not by
-    cancellation.
+    segments, nothing of them is left in the assembled matrix; nor is a loss that weak where nothing else holds it.
+    `anchor` (N,) names for each dof the one on its fibril from which it is measured, or itself: then the segments' part
+    in the anchor's row is zero by construction, not by cancellation.
     """
     x = np.nan_to_num(np.tile(value, (len(load), 1)))
     if not len(free_dofs):
         return x
-    move, fibrils, jump = _measured(system, anchor)
-    if system.loss is not None:
-        fibrils = fibrils + system.loss
+    move, matrix = measured(system, anchor)
     # Positive definite, so no pivoting: as fast as COLAMD on the paper's cell, three times as fast on a denser one.
     # Panels and relaxed supernodes double the time on the paper's cell and save none on denser ones.
     factor = splu(
-        (fibrils + _coupling(jump, system.conductance))[free_dofs][:, free_dofs].tocsc(),
+        matrix[free_dofs][:, free_dofs].tocsc(),
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
         panel_size=1,
@@ -141,19 +148,24 @@ def balance(system: System, load: Floats, value: Floats, free_dofs: Ints, anchor
     return x
 
 
-def _measured(system: System, anchor: Ints | None) -> tuple[Any, Any, Any]:
-    """What makes values of those above the anchors (N, N), and the fibrils' stiffness and the jumps in their terms."""
-    n = system.conduction.shape[0]
-    every = np.arange(n)
-    if anchor is None:
-        return identity(n, format="csr"), system.conduction, system.jump
-    led = np.flatnonzero(anchor != every)
-    move = csr_matrix(
-        (np.ones(n + len(led)), (np.concatenate([every, led]), np.concatenate([every, anchor[led]]))), shape=(n, n)
-    )
-    own = np.ones(n)
-    own[anchor[led]] = 0.0
-    return move, diags_array(own) @ system.conduction @ diags_array(own), csr_matrix(system.jump @ move)
+def measured(system: System, anchor: Ints | None) -> tuple[Any, Any]:
+    """(N, N) each: what makes values of those above the anchors, and stiffness with contacts and loss in terms of them,
+    move^T K move, in which the fibrils' part is exactly zero at anchors."""
+    n, loss = system.conduction.shape[0], system.loss
+    move, fibrils, jump = identity(n, format="csr"), system.conduction, system.jump
+    if anchor is not None:
+        every = np.arange(n)
+        led = np.flatnonzero(anchor != every)
+        rows, columns = np.concatenate([every, led]), np.concatenate([every, anchor[led]])
+        move = csr_matrix((np.ones(n + len(led)), (rows, columns)), shape=(n, n))
+        own = np.ones(n)
+        own[anchor[led]] = 0.0
+        fibrils = diags_array(own) @ system.conduction @ diags_array(own)
+        jump = csr_matrix(system.jump @ move)
+        loss = None if loss is None else move.T @ loss @ move
+    if loss is not None:
+        fibrils = fibrils + loss
+    return move, fibrils + _coupling(jump, system.conductance)
 
 
 def peak(basis: Any, temperature: Floats) -> float:

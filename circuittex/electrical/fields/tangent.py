@@ -133,7 +133,7 @@ class Tangent:
 
 
 def linearised(
-    resistors: Resistors, at: Tangent, cooling: Any, power: float, exponent: int, hot: int | None = None
+    resistors: Resistors, at: Tangent, cooling: Any, move: Any, power: float, exponent: int, hot: int | None = None
 ) -> Any:
     """Newton's matrix for potential, temperature and factors and, if `exponent` > 0, the relative change of `power`.
 
@@ -146,12 +146,12 @@ def linearised(
         -(n / G) sum (h / f) df + dp / p                     = 0
 
     where G = sum h, and G changes by -sum (h / f) df only, since the potential makes the power stationary; K is
-    `cooling` (N, N), the tangent of what leaves each dof. With `hot` the last row is dT of that dof, whose rise is
-    given in place of n.
+    the tangent of what leaves each dof. With `hot` the last row is dT of that dof, whose rise is given in place of n.
+    Temperatures are sought as `move` (N, N) makes them, dT = move dy; `cooling` (N, N) is move^T K move (`measured`).
     """
-    D, H, S = resistors.difference, resistors.warms, resistors.factor
+    D, S = resistors.difference, resistors.factor
     D = D[:, at.free]
-    H = H.tocsr()[at.inside]
+    H = csr_array(move.T @ resistors.warms)[at.inside]
     by_factor = S @ diags_array(1.0 / at.factors)
     dV = D.T @ diags_array(at.conductance) @ D
     dV_df = -(D.T @ diags_array(at.current) @ by_factor)
@@ -161,7 +161,7 @@ def linearised(
     rows = [
         [dV, None, dV_df],
         [dT_dv, cooling[at.inside][:, at.inside], dT_df],
-        [None, -at.change[:, at.inside], diags_array(np.ones(len(at.factors)))],
+        [None, -csr_array(at.change @ move)[:, at.inside], diags_array(np.ones(len(at.factors)))],
     ]
     if exponent or hot is not None:
         column = -power * (H @ at.heat)
@@ -169,7 +169,7 @@ def linearised(
         rows[1].append(csr_array(column[:, None]))
         rows[2].append(None)
     if hot is not None:
-        rows.append([None, csr_array((at.inside == hot)[None, :].astype(np.float64)), None, None])
+        rows.append([None, csr_array(move)[[hot]][:, at.inside], None, None])
     elif exponent:
         dG = np.asarray(heats.sum(axis=0)).ravel() * (-exponent / float(at.heat.sum()))
         rows.append([None, None, csr_array(dG[None, :]), csr_array(np.ones((1, 1)))])

@@ -36,6 +36,8 @@ def band_figures(ensemble: Ensemble) -> dict[str, Figure]:
         "forces": [(f"clamps at the {ENDS[s]}", "force (N)", [(f"{s}_F{c}", f"F{c}") for c in "xyz"]) for s in SIDES],
         "currents": [
             (f"probe {probe.name}", f"current at {probe.drive} (A)", [(f"current_{probe.name}", "")])
+            if probe.current is None
+            else (f"probe {probe.name}", f"voltage at {probe.drive} (V)", [(f"voltage_{probe.name}", "")])
             for probe in ensemble.design.probes
         ],
         "network": [

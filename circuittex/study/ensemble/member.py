@@ -76,7 +76,7 @@ def _records(folder: Path) -> tuple[Record, ...]:
 
 def _values(design: Design, records: Sequence[Record]) -> Floats:
     """(S, Q) values of the records, in the order of the design's states."""
-    found = {record.name: measure(record) for record in records}
+    found = {record.name: measure(design, record) for record in records}
     missing = [np.nan] * len(quantities(design))
     return np.array([found.get(step.name, missing) for step in plan(design)], dtype=np.float64)
 

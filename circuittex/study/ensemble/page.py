@@ -12,7 +12,7 @@ from circuittex.study.ensemble.result import BANDS, Ensemble, percentiles
 
 CAPTIONS = {
     "forces": "Total force of the clamps on the +x ends of the warp and on the +y ends of the weft, by component.",
-    "currents": "Current of each probe.",
+    "currents": "Current of each probe; the voltage of one that is driven by a current.",
     "network": "Resistance Ry of a yarn segment between two crossings, and Rc of a crossing.",
 }
 

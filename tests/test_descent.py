@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pytest
 from fabrics import small_cell
 
 from circuittex.base.arrays import Floats
-from circuittex.base.errors import PenetrationError
+from circuittex.base.errors import ConvergenceError, PenetrationError
+from circuittex.base.frozen import same
 from circuittex.design import Design
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.mech.descent import descend
+from circuittex.mech.minimise import Minimum, minimise
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import DOFS, Pattern
 from circuittex.mech.scales import fibril_scales
 from circuittex.mech.system import System
-from circuittex.relaxation.relax import Equilibrium, force_terms, move, relax
+from circuittex.relaxation.relax import PATIENT, Equilibrium, force_terms, move, relax
 
 TIGHT = 1e-9
 """N; clamp forces are some 0.1 N."""
@@ -66,7 +69,7 @@ def descended(witness: Witness, stride: float) -> tuple[System, Floats, Floats, 
     start = space.vector(initial_configuration(mesh))
     scales = fibril_scales(space, design.weave.least_pitch, 5.0)
     system = System([beam, contact, witness], scales, space.fixed, len(start))
-    q, count = descend(system, MultifrontalSolver(), start, stride=stride, limits=(2e-5, 0.0))
+    q, count = descend(system, MultifrontalSolver(), start, stride=stride, limits=(2e-5, 0.0), max_iterations=1500)
     return system, start, q, count
 
 
@@ -153,6 +156,33 @@ def test_a_step_of_a_path_ends_where_newtons_method_ends_it(monkeypatch: pytest.
     assert found.iterations > 2
     assert found.residual < 1e-2 * found.history[-1][0] < 1e-2 * 1e-4
     assert np.abs(found.reaction - alone.reaction).max() < 1e-6
+
+
+@pytest.mark.parametrize("tried", [PATIENT, PATIENT + 50])
+def test_a_step_that_newtons_method_does_not_end_is_tried_by_gradients(
+    monkeypatch: pytest.MonkeyPatch, tried: int
+) -> None:
+    """Where it was given a chance: a lower limit of its iterations is meant, and ends the step."""
+    design, mesh = small_cell((1,), yarns=1)
+    rest = relax(mesh, design)
+    moved = move(rest.configuration, np.eye(2), np.diag([1.02, 1.0]))
+
+    def tired(*of: Any, stride: float, **more: Any) -> Minimum:
+        if stride == 0.0:
+            raise ConvergenceError("no equilibrium", np.zeros((tried, 4)))
+        return minimise(*of, stride=stride, **more)
+
+    monkeypatch.setattr("circuittex.relaxation.relax.minimise", tired)
+    if tried <= PATIENT:
+        with pytest.raises(ConvergenceError):
+            relax(mesh, design, moved, before=rest.configuration)
+        return
+    found = relax(mesh, design, moved, before=rest.configuration)
+    with_descent(monkeypatch)
+    monkeypatch.setattr("circuittex.relaxation.relax.minimise", minimise)
+    by_gradients = relax(mesh, design, moved, before=rest.configuration)
+    assert same(found.configuration, by_gradients.configuration)
+    assert found.iterations == by_gradients.iterations + tried - 1
 
 
 def relaxed(s: float, m: float) -> tuple[Design, FibrilMesh, Equilibrium]:

@@ -22,7 +22,7 @@ from circuittex.base.frozen import same
 from circuittex.design import Clamps, Design, equal_steps, uniaxial
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
-from circuittex.mech import descent
+from circuittex.mech import descent, minimise
 from circuittex.mech.checkpoint import Checkpoint, Checkpoints
 from circuittex.mech.configuration import initial_configuration
 from circuittex.relaxation.relax import Equilibrium, relax
@@ -97,7 +97,7 @@ def test_from_every_checkpoint_on_all_is_the_same(cell: Callable[[], Design], of
 
 
 def test_a_descent_that_gives_up_is_not_done_again(often: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(descent, "MOST_ITERATIONS", 24)
+    monkeypatch.setattr(minimise, "descend", lambda *a, **k: descent.descend(*a, **(k | {"max_iterations": 24})))
     design, mesh = small_cell()
     whole, kept = kept_by(design, mesh)
     assert [(checkpoint.iteration, checkpoint.ended) for checkpoint in kept] == [(APART, False), (24, True)]

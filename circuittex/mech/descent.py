@@ -45,8 +45,6 @@ LEAST_CUT = 0.1
 """Part of a step that failed which the next is at least."""
 CURVED = 0.1
 """Part of its slope by which a step must have changed it for its pair to be kept."""
-MOST_ITERATIONS = 1500
-"""Cells of 16, 64 and 256 crossings took 314, 388 and 601."""
 
 
 def descend(
@@ -57,15 +55,16 @@ def descend(
     *,
     stride: float,
     limits: tuple[float, float],
+    max_iterations: int,
     report: Callable[[int, float], None] | None = None,
     checkpoints: Checkpoints = NONE,
 ) -> tuple[Floats, int]:
     """Unknowns (n_dofs,) with a lower potential than those of q, and the iterations that led there.
 
     The descent ends where each fibril's free force is below what `System.limits` makes of the two tolerances `limits`,
-    where no step lowers the potential any more, or where one would press fibrils through one another: Newton's method
-    has the last word on all of these. No step moves a node by more than `stride`, mm. It begins with the factor
-    `solve` of the tangent assembled last, near q, if there is one.
+    where no step lowers the potential any more, where one would press fibrils through one another, or after
+    `max_iterations`: Newton's method has the last word on all of these. No step moves a node by more than `stride`, mm.
+    It begins with the factor `solve` of the tangent assembled last, near q, if there is one.
 
     Where `checkpoints` tell of a place that was reached, it goes on from there in place of q, and takes the steps that
     it would have taken, to the last bit.
@@ -83,7 +82,7 @@ def descend(
         q, shift, most, begun = reached.q.copy(), reached.shift, reached.most, reached.iteration
         begin_anew(system, solver)
         pairs.extend(zip(reached.steps, reached.turns, reached.curvatures.tolist(), strict=True))
-    for iteration in range(begun, MOST_ITERATIONS):
+    for iteration in range(begun, max_iterations):
         if solve is None or age >= LASTS:
             if iteration >= begun + APART:
                 begun = iteration
@@ -119,7 +118,7 @@ def descend(
         if curvature > -CURVED * step * _dot(force, direction):
             pairs.append((change, turned, curvature))
         q, energy, gradient, age = q + change, lower, steeper, age + 1
-    return q, MOST_ITERATIONS
+    return q, max_iterations
 
 
 def hand_over(system: System, solver: LinearSolver, q: Floats, iterations: int, checkpoints: Checkpoints) -> None:

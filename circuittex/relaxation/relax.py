@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from circuittex.base.arrays import Floats
-from circuittex.base.errors import ConvergenceError
+from circuittex.base.errors import ConvergenceError, PenetrationError
 from circuittex.base.frozen import frozen, same
 from circuittex.contact.law import largest_penalty
 from circuittex.contact.penalty import PenaltyContact
@@ -36,6 +36,9 @@ WORTH_A_DESCENT = 40_000
 """Unknowns from which on a first relaxation begins with a descent by gradients. With 29,520 of them, 4 x 4 yarns of ten
 fibrils, it costs as much as Newton's method alone, with 50,184, 2 x 2 yarns of 34, and more a fraction
 (`benchmarks/size.py`)."""
+
+PATIENT = 100
+"""Iterations of Newton's method after which a step of a loading path that is not at rest is tried by gradients."""
 
 
 @frozen
@@ -155,9 +158,8 @@ def _relaxed(
     scales = replace(scales, newtons=units.force)
 
     large = begins_with_gradients(space.n_dofs, step=before is not None)
-    stride = float(mesh.radius.min()) if large else 0.0
 
-    def descend(q: Floats, part: float, may_creep: bool) -> Minimum:
+    def descend(q: Floats, part: float, may_creep: bool, by_gradients: bool = large) -> Minimum:
         contact.part, true = part, part == 1.0
         first = true and not may_creep  # of `continued`, which comes back to the true penalty with leave to creep
         return minimise(
@@ -172,13 +174,25 @@ def _relaxed(
             force_tolerance=numerics.force_tolerance if true else 0.0,
             max_iterations=numerics.max_iterations,
             may_creep=may_creep,
-            stride=stride,
+            stride=float(mesh.radius.min()) if by_gradients else 0.0,
             report=report,
             checkpoints=checkpoints if first else NONE,
         )
 
     q = space.vector(start)
-    minimum = descend(q, 1.0, True) if before is not None else continued(descend, q)
+    if before is None:
+        minimum = continued(descend, q)
+    else:
+        try:
+            minimum = descend(q, 1.0, True)
+        except PenetrationError:
+            raise
+        except ConvergenceError as error:
+            if large or len(error.history) <= PATIENT:
+                raise
+            # Among stiff contacts every step of Newton's method is cut short; gradients get there all the same.
+            minimum = descend(q, 1.0, True, by_gradients=True)
+            minimum = replace(minimum, iterations=minimum.iterations + len(error.history) - 1)
     found = Equilibrium(
         configuration=space.configuration(minimum.q),
         reaction=space.configuration(minimum.gradient).r,

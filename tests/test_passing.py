@@ -20,6 +20,8 @@ from circuittex.contact.passing import (
     NEIGHBOURS,
     SafeStep,
     chords,
+    clearance,
+    free_motion,
     safe_step,
     segment_distance,
 )
@@ -205,6 +207,56 @@ def test_a_safe_part_is_safe_at_every_moment(seed: int, size: float, radius: flo
     if part < 1.0:  # and it is a collision that limits it
         now, _ = chord_distances(mesh, mesh.position + part * motion)
         assert (now - (1 + CLOSEST) * least).min() <= ROUND_OFF
+
+
+# ---- motions that need not be followed --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gap", [0.05, 0.2, 2 * R, 1.0])
+def test_how_far_all_nodes_may_go(gap: float) -> None:
+    """Head on, two straight fibrils collide when each has gone 3/8 of the gap, 4/3 of what is free: that counts on
+    curves whose points outrun their nodes. Far apart, chords count that are half as far along as is no neighbour."""
+    mesh = crossing(gap)
+    distance = clearance(curve_table(mesh), mesh.radius, mesh.position)
+    if gap <= NEIGHBOURS / 2 * R:
+        assert distance == pytest.approx(gap, rel=ROUND_OFF)
+    else:
+        assert NEIGHBOURS / 2 * R <= distance <= 2 * R
+    towards = np.where((mesh.node_fibril == 1)[:, None], [0.0, 0.0, -1.0], [0.0, 0.0, 1.0])
+    assert step(mesh, free_motion(distance) * towards).fraction == 1.0
+    if gap <= NEIGHBOURS / 2 * R:
+        assert step(mesh, 1.34 * free_motion(distance) * towards).fraction < 1.0
+
+
+@settings(deadline=None, max_examples=40)
+@given(seeds, st.sampled_from([0.05, 0.15]))
+def test_whatever_moves_no_further_is_safe(seed: int, radius: float) -> None:
+    mesh = tangle(seed, fibrils=4, elements=4, radius=radius)
+    distance = clearance(curve_table(mesh), mesh.radius, mesh.position)
+    first, fibrils = chord_distances(mesh, mesh.position)
+    touch = mesh.radius[fibrils].sum(axis=1)
+    assert 0.0 < distance <= np.minimum(first, touch).min(initial=2 * radius) + ROUND_OFF
+    way = np.random.default_rng(seed).normal(size=(mesh.n_nodes, 3))
+    way *= free_motion(distance) / np.linalg.norm(way, axis=1, keepdims=True)
+    assert step(mesh, way).fraction == 1.0
+
+
+@settings(deadline=None, max_examples=20)
+@given(seeds)
+def test_contact_answers_as_if_every_motion_were_followed(seed: int) -> None:
+    """Short motions one after another, some of them free and some not, until fibrils are far from where they were."""
+    mesh, rng = tangle(seed, fibrils=4, elements=4, radius=0.15), np.random.default_rng(seed)
+    term, _ = contact_term(mesh)
+    r = mesh.position.copy()
+    for _ in range(12):
+        motion = 10 ** rng.uniform(-3, -1) * rng.normal(size=r.shape)
+        expected = safe_step(curve_table(mesh), mesh.radius, r, motion)
+        if expected.fraction < 1.0:
+            motion *= 0.5 * expected.fraction
+            expected = safe_step(curve_table(mesh), mesh.radius, r, motion)
+        q, direction = (np.pad(x, ((0, 0), (0, 6))).ravel() for x in (r, motion))
+        assert term.longest(q, direction) == expected.fraction
+        r = r + motion
 
 
 # ---- contact ----------------------------------------------------------------------------------------------

@@ -17,11 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from circuittex.base.arrays import Floats
+from circuittex.base.arrays import Floats, Ints
 from circuittex.base.compiled import compiled
 from circuittex.base.frozen import frozen
 from circuittex.contact.curve import BASIS, CurveTable
 from circuittex.contact.law import effective_modulus, hertz_penalty, pair_penalty
+from circuittex.contact.search import CONTROL_MOTION
 from circuittex.design import ContactLaw
 from circuittex.geometry.mesh import FibrilMesh
 
@@ -98,18 +99,43 @@ def safe_step(table: CurveTable, radius: Floats, r: Floats, motion: Floats) -> S
     1.0
     """
     start, way = chords(table, r), chords(table, motion)
-    end = start + way
-    reach = COLLISION * radius[table.fibril][:, None]
-    low = np.minimum(start, end).min(axis=1) - reach
-    high = np.maximum(start, end).max(axis=1) + reach
-    axis = int(np.argmax(np.ptp(low, axis=0)))
-    rising = np.argsort(low[:, axis], kind="stable")
-    turned = np.roll(np.arange(3), -axis)  # the axis of the sweep first
-    low, high = (np.ascontiguousarray(box[rising][:, turned]) for box in (low, high))
     found = np.array([1.0, 0.0, 0.0, np.inf])
-    _sweep(rising, low, high, table.fibril, radius, start, way, _along(table.fibril, start), found)
+    boxes = _boxes(start, start + way, COLLISION * radius[table.fibril])
+    _sweep(*boxes, table.fibril, radius, start, way, _along(table.fibril, start), found)
     pair = sorted(found[1:3].astype(int).tolist())
     return SafeStep(float(found[0]), (pair[0], pair[1]), float(found[3]))
+
+
+def clearance(table: CurveTable, radius: Floats, r: Floats) -> float:
+    """Smallest distance of the chords of two fibrils, or of one that are not neighbours along it, mm; at most the
+    smallest R + R'.
+
+    Nodes may move by `free_motion` of it without a collision, wherever they go.
+    """
+    start = chords(table, r)
+    found = np.array([2 * float(radius.min())])
+    _approach(
+        *_boxes(start, start, radius[table.fibril]), table.fibril, radius, start, _along(table.fibril, start), found
+    )
+    return float(found[0])
+
+
+def free_motion(distance: float) -> float:
+    """How far each node can go where chords are so far apart, mm: a point of a curve goes at most `CONTROL_MOTION`
+    times as far, and two of them come closer by twice that."""
+    return (1.0 - COLLISION) * distance / (2 * CONTROL_MOTION)
+
+
+def _boxes(start: Floats, end: Floats, reach: Floats) -> tuple[Ints, Floats, Floats]:
+    """The intervals by the lower end along the longest axis of the boxes (I, 3) that their chords sweep, widened by
+    `reach` (I,); and, in that order and with that axis first, the boxes' lower and upper ends."""
+    low = np.minimum(start, end).min(axis=1) - reach[:, None]
+    high = np.maximum(start, end).max(axis=1) + reach[:, None]
+    axis = int(np.argmax(np.ptp(low, axis=0)))
+    rising = np.argsort(low[:, axis], kind="stable")
+    turned = np.roll(np.arange(3), -axis)
+    low, high = (np.ascontiguousarray(box[rising][:, turned]) for box in (low, high))
+    return rising, low, high
 
 
 def likely_cause(mesh: FibrilMesh, law: ContactLaw, first: int, second: int, modulus: float = 1.0) -> str:
@@ -244,6 +270,32 @@ def _sweep(
                     fraction = _safe_fraction(p, u, q, v, touch, scratch, first)
                     if fraction < found[0]:
                         found[0], found[1], found[2], found[3] = fraction, f, fibril[j], first[0]
+
+
+@compiled
+def _approach(rising: Any, low: Any, high: Any, fibril: Any, radius: Any, start: Any, along: Any, found: Any) -> None:
+    """Bring found (1,) down to the smallest distance of all pairs of chords but neighbours; as `_sweep`.
+
+    Those of one fibril count from half the way along it on, since they may not be neighbours any more when it is used.
+    """
+    still = np.zeros((2, 3))
+    for n in range(rising.shape[0]):
+        i = rising[n]
+        f, ends, x, y, z, w = fibril[i], high[n, 0], low[n, 1], high[n, 1], low[n, 2], high[n, 2]
+        for m in range(n, rising.shape[0]):
+            if low[m, 0] > ends:
+                break
+            if low[m, 1] > y or high[m, 1] < x or low[m, 2] > w or high[m, 2] < z:
+                continue
+            j = rising[m]
+            own, near = fibril[j] == f, 0.5 * NEIGHBOURS * radius[f]
+            for a in range(start.shape[1] - 1):
+                for b in range(start.shape[1] - 1):
+                    p, q = start[i, a : a + 2], start[j, b : b + 2]
+                    if own and max(along[j, b] - along[i, a + 1], along[i, a] - along[j, b + 1]) < near:
+                        continue
+                    if _may_meet(p, still, q, still, found[0]):
+                        found[0] = min(found[0], segment_distance(p[0], p[1], q[0], q[1]))
 
 
 @compiled

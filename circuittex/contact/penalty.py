@@ -17,7 +17,7 @@ from circuittex.contact.curve import CurveTable, curve_table, curve_through
 from circuittex.contact.hull import QUARTER, hulls
 from circuittex.contact.kernels import Rows, Sums, Touches, add_contacts, add_forces
 from circuittex.contact.law import pair_penalty
-from circuittex.contact.passing import PRESSED, likely_cause, safe_step
+from circuittex.contact.passing import PRESSED, clearance, free_motion, likely_cause, safe_step
 from circuittex.contact.search import CONTROL_MOTION, Candidates, bent_back, coupled_nodes, find_candidates
 from circuittex.design import ContactLaw
 from circuittex.geometry.mesh import FibrilMesh, pair_label
@@ -34,6 +34,9 @@ refused at a glance, and they last for as long as nothing moves by R or so."""
 LIKELY = 2 / 3 * QUARTER
 """Where a fibril turns by as much on its way from one stretch of it to another, the pattern has room for their contact:
 it can come only once that has become a quarter."""
+SHORT = 0.1
+"""Parts of the smallest radius up to which a motion is short: it pays to know how far all nodes can go, since several
+motions as short as that are free then."""
 CHUNKS = 16
 """Candidates are searched in this many pieces, whatever the number of threads."""
 
@@ -68,6 +71,11 @@ def contact_points(mesh: FibrilMesh, per_element: int) -> Floats:
     for k, row in enumerate(rows):
         table[k, : len(row)] = row
     return table
+
+
+def _farthest(motion: Floats) -> float:
+    """The longest of motions (N, 3), mm."""
+    return float(np.sqrt(np.einsum("nk,nk->n", motion, motion).max()))
 
 
 def _lasts(known: tuple[Candidates, Floats] | None, r: Floats, skin: float) -> TypeGuard[tuple[Candidates, Floats]]:
@@ -111,6 +119,8 @@ class PenaltyContact:
         self._own: NDArray[np.bool_] = np.empty(0, dtype=np.bool_)
         """(rows,) the stretches of its own fibril that the pattern has room for, of those held."""
         self._last: tuple[Floats, Touching] | None = None
+        self._clear: tuple[Floats, float] | None = None
+        """Nodes (N, 3), and how far each may go from there in any direction without a collision, mm."""
 
     def positions(self, q: Floats) -> Floats:
         """(N, 3) centre-line nodes."""
@@ -128,7 +138,7 @@ class PenaltyContact:
 
     def forget(self) -> None:
         """The next candidates are searched around where they are asked for."""
-        self._held = self._tried = self._wide = self._last = None
+        self._held = self._tried = self._wide = self._last = self._clear = None
         self._own = np.empty(0, dtype=np.bool_)
 
     def _near(self, r: Floats) -> tuple[Candidates, Floats]:
@@ -203,12 +213,23 @@ class PenaltyContact:
 
         Raises `PenetrationError` where a pair that limits it is pressed together as if there were no contact.
         """
-        mesh = self.mesh
-        step = safe_step(self.table, mesh.radius, self.positions(q), self.positions(direction))
+        mesh, r, motion = self.mesh, self.positions(q), self.positions(direction)
+        if self._clears(r, motion):
+            return 1.0
+        step = safe_step(self.table, mesh.radius, r, motion)
         if step.fraction < 1.0 and step.distance < PRESSED * mesh.radius[list(step.fibrils)].sum():
             what = f"{pair_label(mesh, *step.fibrils)} are pressed through one another"
             raise PenetrationError(f"{what}; {likely_cause(mesh, self.law, *step.fibrils, self.modulus)}")
         return step.fraction
+
+    def _clears(self, r: Floats, motion: Floats) -> bool:
+        """Whether the motion (N, 3) of nodes r (N, 3) is so short that nothing collides, whatever moves where."""
+        longest, radius = _farthest(motion), self.mesh.radius
+        if longest > SHORT * float(radius.min()):
+            return False
+        if self._clear is None or _farthest(r - self._clear[0]) + longest > self._clear[1]:
+            self._clear = r, free_motion(clearance(self.table, radius, r))
+        return _farthest(r - self._clear[0]) + longest <= self._clear[1]
 
     def _touches(self, found: Touching) -> Touches:
         """The contact points as compiled functions take them."""

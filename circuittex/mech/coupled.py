@@ -25,7 +25,7 @@ class Coupled:
         """(nnz,) pair of each entry of the pattern (`pair_of_entry`)."""
         self.pairs: NDArray[np.bool_]
         """whether each pair of the pattern counts."""
-        self.entries: Ints
+        self.entries: NDArray[np.int32]
         """places of the entries that count: those within a node, and those of pairs that do."""
 
     def renew(self, pattern: Pattern, data: NDArray[np.float64]) -> bool:
@@ -55,9 +55,9 @@ def pair_of_entry(pattern: Pattern) -> NDArray[np.int32]:
     return pair
 
 
-def entries_of(pair: NDArray[np.int32], pairs: NDArray[np.bool_]) -> Ints:
+def entries_of(pair: NDArray[np.int32], pairs: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Places of the entries of these pairs, and of those within a node; `pair` (nnz,) as `pair_of_entry` gives it."""
-    return np.flatnonzero(np.append(pairs, True)[pair])
+    return np.flatnonzero(np.append(pairs, True)[pair]).astype(np.int32)
 
 
 @compiled

@@ -62,7 +62,9 @@ def analysed(matrix: sp.sparray, position: Floats | None = None) -> tuple[Analys
     graph.eliminate_zeros()
     graph.data[:] = 1.0
     blocks = Blocks(graph, np.arange(n), np.ones(n, dtype=np.int64), levels(graph) if position is None else position)
-    entries = Entries(upper.indptr.astype(np.int64), upper.indices.astype(np.int32), np.arange(upper.nnz))
+    entries = Entries(
+        upper.indptr.astype(np.int64), upper.indices.astype(np.int32), np.arange(upper.nnz, dtype=np.int32)
+    )
     return analyse(blocks, entries), upper.data
 
 

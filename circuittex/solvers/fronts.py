@@ -115,7 +115,7 @@ class Entries:
     """(n_dofs + 1,) where rows begin."""
     indices: NDArray[np.int32]
     """column of each place; of the two places of a pair of unknowns one is used."""
-    used: Ints
+    used: NDArray[np.int32]
     """the places that count, rising."""
 
 

@@ -19,8 +19,9 @@ from circuittex.relaxation.relax import clamp_force, relax
 
 pytestmark = pytest.mark.xdist_group("paper_cell")  # what its fixtures make serves one worker
 
-MOST_ITERATIONS = 80
-"""What a relaxation of this cell, and any step of 2.5 %, may take."""
+MOST_ITERATIONS, MOST_GRADIENTS = 80, 200
+"""What a relaxation of this cell, and any step of 2.5 %, may take: of Newton's method, and by gradients, of which each
+is an eighth of that."""
 SYMMETRY = 1e-5
 """Relative difference allowed between warp and weft forces, which a symmetry of the cell makes equal: the free
 residual of 1e-6 N on either side of a force of about 1 N, and its amplification by the softest mode."""
@@ -57,7 +58,9 @@ def wave_force(design: Design) -> float:
 def test_equilibrium_is_found_in_time(cell: Cell) -> None:
     for state in (cell.relaxed, cell.stretched):
         assert state.residual <= 1e-6
-        assert state.iterations <= MOST_ITERATIONS
+        newton = len(state.history) - 1
+        assert newton <= MOST_ITERATIONS
+        assert state.iterations - newton <= MOST_GRADIENTS
 
 
 def test_forces_are_equal_in_both_directions_by_symmetry(cell: Cell) -> None:

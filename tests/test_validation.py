@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
-from math import pi
+from math import log, pi
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -34,7 +34,7 @@ def test_the_page_has_what_is_computed(script: Any) -> None:
     """Those that take no relaxation, all of them again; words are the same, and numbers within what is printed."""
     rods = script("rods")
     found = [script("wires").compare(), rods.steel(), rods.brush(), rods.steel_rods(), *rods.compare()]
-    found += [script("carbon").laminate()]
+    found += [script("carbon").laminate(), script("carbon").pressed()]
     for comparison in found:
         mine = comparison.text().strip()
         start = PAGE.index(f"## {comparison.title}\n")
@@ -81,6 +81,32 @@ def test_a_bundle_stretches_bends_and_conducts_as_its_filaments(script: Any) -> 
     lacks = skin * pi * (R**2 - r**2) * r**2 / 4
     assert stretched * bent**2 / 4 == pytest.approx(free + tube - lacks, rel=ROUNDING)
     assert tube > 0.5 * free, "the skin is seen at all"
+
+
+def test_fibres_on_a_plate_touch_in_hertz_strips(script: Any) -> None:
+    """Fibres side by side on graphite at 1 MPa, by hand: strips of width 2 b, into which the current is constricted."""
+    carbon = script("carbon")
+    R, load = 0.0035, 1.0 * 2 * 0.0035  # N/mm: a fibre carries what is pressed on its width
+    E = 1 / ((1 - 0.3**2) / 15e3 + (1 - 0.2**2) / 10e3)
+    b = (4 * load * R / (pi * E)) ** 0.5
+    length = 1 / (2 * R)  # mm of fibre on each mm2
+    film = 1 / (2e4 * 2 * b * length)  # ohm mm2
+    spread = (3.5 * 1.5e-2 + 1.5e-2) * (log(2 * R / b) + 1 / 8) / (pi * length)
+    for law, expected in ((carbon.crossed, film), (carbon.holm, spread), (carbon.film, film + spread)):
+        found = carbon.on_plate("graphite", 1.0, law, 1.0, 3.5, 2e4)
+        assert found == pytest.approx(expected * 1e3 * 1e-2, rel=ROUNDING)  # mohm in an ohm, cm2 in a mm2
+    assert 0.1 * spread < film < 10 * spread, "both are seen in their sum"
+
+
+def test_the_film_of_the_rods_makes_up_for_what_they_lack(script: Any) -> None:
+    """Hertz's circles by hand, six of them: a film on all of it, and metal of 1.5 times the least resistivity."""
+    rods = script("rods")
+    films = []
+    for force in (0.1, 1.0, 10.0):
+        for R in (0.75, 1.5):
+            a = (3 * force * R / (4 * 206e3 / (2 * (1 - 0.29**2)))) ** (1 / 3)
+            films.append((7.6e-3 / (0.102 * force) ** 0.5 - 1.5 * 1.0e-4 / (2 * a)) * pi * a**2)
+    assert rods.steel_films() == pytest.approx((min(films), max(films)), rel=ROUNDING)
 
 
 def test_heat_to_the_air_is_as_textbooks_tabulate(script: Any) -> None:

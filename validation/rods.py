@@ -24,6 +24,8 @@ HANDBOOK = Source(
 )
 STEEL = 7600.0
 """K of the same table, microohm, for steel on steel."""
+STEEL_FORCES, STEEL_RADII = (0.1, 1.0, 10.0), (0.75, 1.5)
+"""N, mm, of the rods that are compared with it."""
 BRUSH = Source(
     "fibre brush",
     "'Sliding electrical contact properties of highly oriented copper fiber brush', abstract: 'the static contact resistance decreases significantly from "
@@ -48,6 +50,7 @@ MATERIALS = {
     "steel": (7.4e-4, 193e3, 0.29),
     "mild steel": (1.0e-4, 206e3, 0.29),
     "carbon": (1.5e-2, 15e3, 0.3),
+    "graphite": (1.5e-2, 10e3, 0.2),
 }
 """ohm mm, MPa, nu."""
 
@@ -136,17 +139,29 @@ def brush() -> Comparison:
     )
 
 
-def steel_rods() -> Comparison:
-    radii, films, points = (0.75, 1.5), [], []
-    for force in (0.1, 1.0, 10.0):
+def steel_films() -> tuple[float, float]:
+    """Least and most ohm mm2 of a film on Hertz's area that makes up for what bare rods of steel lack of the handbooks'."""
+    films = []
+    for force in STEEL_FORCES:
         measured = STEEL * 1e-6 / sqrt(0.102 * force)
-        least = [resistance("mild steel", force, radius) for radius in radii]
+        for radius in STEEL_RADII:
+            bare, area = (
+                resistance("mild steel", force, radius),
+                1 / resistance("mild steel", force, radius, crossed),  # film = 1: S of 1 S/mm2
+            )
+            films.append((measured - 1.5 * bare) * area)
+    return min(films), max(films)
+
+
+def steel_rods() -> Comparison:
+    points = []
+    for force in STEEL_FORCES:
+        measured = STEEL * 1e-6 / sqrt(0.102 * force)
+        least = [resistance("mild steel", force, radius) for radius in STEEL_RADII]
         points.append(
             Point(f"steel, {force:g} N", Band(1e3 * measured, 1e3 * measured), Band(1e3 * min(least), 2e3 * max(least)))
         )
-        areas = [1 / resistance("mild steel", force, radius, crossed) for radius in radii]  # film = 1: S of 1 S/mm2
-        films += [(measured - 1.5 * bare) * area for bare, area in zip(least, areas, strict=True)]
-    low, high = (1e-6 * each for each in (min(films), max(films)))
+    low, high = (1e-6 * each for each in steel_films())
     return Comparison(
         title="Crossed rods of steel",
         measured="What switchgear is designed by, for point contacts of steel on steel: a stand-in for a crossing of steel filaments, of which no measurement was found.",

@@ -50,9 +50,12 @@ def contact_state(
     weight = term.weight[a] * part
     xi_a = (touching.interval_a - table.first_interval[a] + touching.t_a) * spacing[a]
     xi_b = touching.position_b * spacing[b]
-    square = _sine_squared(table, term.positions(space.vector(configuration)), touching)
-    points = Points(a, b, xi_a, xi_b, load, width, weight, square)
-    electrical, thermal = conductances(mesh, law, points, 2 * term.weight)
+
+    def square(rows: NDArray[np.bool_]) -> Floats:
+        return _sine_squared(table, term.positions(space.vector(configuration)), _take(touching, rows))
+
+    points = Points(a, b, xi_a, xi_b, load, width, weight)
+    electrical, thermal = conductances(mesh, law, points, 2 * term.weight, square)
     return ContactState(
         mesh=mesh,
         fibril_a=a,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields
 
 import numpy as np
@@ -44,18 +45,23 @@ class Points:
     """(C,) a, mm."""
     weight: Floats
     """(C,) w, mm."""
-    square: Floats
-    """(C,) sin^2 of the angle between the axes."""
 
     def take(self, rows: NDArray[np.bool_]) -> Points:
         return Points(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
 
-def conductances(mesh: FibrilMesh, law: ContactLaw, points: Points, spacing: Floats) -> tuple[Floats, Floats]:
+def conductances(
+    mesh: FibrilMesh,
+    law: ContactLaw,
+    points: Points,
+    spacing: Floats,
+    square: Callable[[NDArray[np.bool_]], Floats],
+) -> tuple[Floats, Floats]:
     """Electrical (C,) S and thermal (C,) W/K conductance of contact points, each by the law of its pair of materials.
 
     No current passes where the surface of either fibril insulates. Heat passes through the same area: h_c a w,
-    h_c 2 a w, or h_c A by all laws that know touches. spacing (F,) mm: of the contact points of a fibril.
+    h_c 2 a w, or h_c A by all laws that know touches. spacing (F,) mm: of the contact points of a fibril; `square`
+    gives sin^2 of the angle between the axes at chosen points, which only those laws ask for.
     """
     names = pair_law(mesh, law, points.a, points.b)
     electrical, thermal = np.zeros(len(names)), np.zeros(len(names))
@@ -68,21 +74,23 @@ def conductances(mesh: FibrilMesh, law: ContactLaw, points: Points, spacing: Flo
             electrical[rows] = per_length(sigma_c, of.half_width) * of.weight
             thermal[rows] = per_length(h_c, of.half_width) * of.weight
             continue
-        found, touches = _touches(mesh, law, of, spacing)
+        found, touches = _touches(mesh, law, of, square(rows), spacing)
         conducts = np.minimum(mesh.surface[of.a], mesh.surface[of.b]) > 0.0
         electrical[rows] = np.where(conducts, found.share * of_touches(name, touches)[found.patch], 0.0)
         thermal[rows] = h_c * (found.share * touches.area[found.patch])
     return electrical, thermal
 
 
-def _touches(mesh: FibrilMesh, law: ContactLaw, points: Points, spacing: Floats) -> tuple[Patches, Touches]:
+def _touches(
+    mesh: FibrilMesh, law: ContactLaw, points: Points, square: Floats, spacing: Floats
+) -> tuple[Patches, Touches]:
     """The touches that contact points add up to."""
     swap = points.a > points.b
     a, b = np.where(swap, points.b, points.a), np.where(swap, points.a, points.b)
     swap |= (a == b) & (points.xi_a > points.xi_b)
     xi = np.stack([np.where(swap, points.xi_b, points.xi_a), np.where(swap, points.xi_a, points.xi_b)], axis=1)
     step = np.maximum(spacing[a], spacing[b])
-    found = patches(patch_of(a * mesh.n_fibrils + b, xi, step), points.load, points.weight, points.square)
+    found = patches(patch_of(a * mesh.n_fibrils + b, xi, step), points.load, points.weight, square)
     first, low, high = np.unique(found.patch, return_index=True)[1], a, b
     a, b, step = a[first], b[first], step[first]
     R, other, E, nu = mesh.radius[a], mesh.radius[b], mesh.youngs_modulus, mesh.poisson_ratio

@@ -151,7 +151,7 @@ def minimise(
         if not np.isfinite(energy):
             raise ConvergenceError("the potential is infinite: a fibril's section is inside out", np.array(history))
         balanced = bool((left <= limits).all())
-        solution = system.factor(solver, FIRST_SHIFT, 1.0) if balanced else None
+        solution = system.factor(solver, FIRST_SHIFT, 1.0, last=True) if balanced else None
         if solution is not None:
             solves = cheap + iteration + (before is not None)
             if cheap > 0 and iteration == 0:
@@ -163,6 +163,8 @@ def minimise(
             raise CreepingError("the steps have become short", np.array(history), q)
         if last:
             break
+        if balanced:
+            system.assemble(q)
         rough = residual > ROUGH * largest
         fractions = SOFTENING[place if refused or place == 0 else place - 1 :] if rough else SOFTENING[:1]
         shift, place, solve = _positive(system, solver, shift, fractions, history)

@@ -48,9 +48,9 @@ class MultifrontalSolver:
         if last is None or last.analysis is not self._analysis or last.single != rough:
             self._cholesky = Cholesky(self._analysis, last, single=rough)
         assert self._cholesky is not None
-        values = data[self._coupled.entries]
+        values = [data[self._coupled.entries]]
         del data  # a tenth of the memory at its peak, where the caller does not keep it
-        return self._cholesky.factor(values)
+        return self._cholesky.factor(values.pop())
 
     def forget(self) -> None:
         """The next matrix is analysed as by a new solver; the memory of the factor stays."""

@@ -56,6 +56,8 @@ class System:
         if self.pattern is None or any(changed):
             self._renew(q)
         assert self.pattern is not None
+        if not len(self.metric):
+            self.metric = self.scales.metric(self.pattern)
         gradient, self.data, self.softening = np.zeros(self.n), np.zeros(self.pattern.nnz), np.zeros(self.pattern.nnz)
         self.forces, energy = np.zeros(len(self.scales.first_node) - 1), 0.0
         for term in self.terms:
@@ -76,16 +78,22 @@ class System:
         pairs = [term.pairs() for term in self.terms]
         full, point = (np.concatenate([p[k] for p in pairs]) for k in (0, 1))
         self.pattern = build_pattern(self.n // DOFS, full, point, q.reshape(-1, DOFS)[:, :3].copy())
-        self.metric = self.scales.metric(self.pattern)
 
-    def factor(self, solver: LinearSolver, shift: float, softening: float, *, rough: bool = False) -> Solve | None:
+    def factor(
+        self, solver: LinearSolver, shift: float, softening: float, *, rough: bool = False, last: bool = False
+    ) -> Solve | None:
         """The shifted tangent's factor, None where it is not positive definite; `rough` as solvers take it, where no
-        motions are eliminated after it, in which digits cancel.
+        motions are eliminated after it, in which digits cancel. The `last` of a place may take the memory of the values
+        that were assembled there, which have to be assembled again if they are wanted.
 
         Its roots would be rounded otherwise at another scale, so what is factorised has no unit (`matrix`).
         """
         assert self.pattern is not None
-        solve = solver.factor(self.pattern, self.matrix(shift, softening), rough=rough and self.motions is None)
+        matrix = [self.matrix(shift, softening)]
+        if last and self.motions is None:
+            self.data, self.softening, self.metric = np.empty(0), np.empty(0), np.empty(0)
+        # Nobody but the solver has the values, which can let them go.
+        solve = solver.factor(self.pattern, matrix.pop(), rough=rough and self.motions is None)
         if solve is not None and self.motions is not None:  # of positions alone: in these units they are what they were
             everything = np.ones(self.n, dtype=bool)
             whole = self._among(everything, shift, softening), self.pattern.indices, self.pattern.indptr

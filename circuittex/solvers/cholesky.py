@@ -105,6 +105,7 @@ class Cholesky:
         """
         self._values[:] = 0.0
         self._values[self.analysis.target] = values
+        del values
         with self._libraries.limit(limits=1, user_api="blas"):
             return self._solve if self._eliminate() else None
 

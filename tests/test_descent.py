@@ -153,7 +153,7 @@ def test_a_step_of_a_path_ends_where_newtons_method_ends_it(monkeypatch: pytest.
     with_descent(monkeypatch)
     found = relax(mesh, design, moved, before=rest.configuration, gradient=stretched)
     assert len(found.history) == 1  # all by gradients
-    assert found.iterations > 2
+    assert found.iterations > 1  # beside the prediction
     assert found.residual < 1e-2 * found.history[-1][0] < 1e-2 * 1e-4
     assert np.abs(found.reaction - alone.reaction).max() < 1e-6
 

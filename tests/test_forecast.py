@@ -34,11 +34,10 @@ from circuittex.solvers.cholesky import Cholesky
 from circuittex.study.forecast import (
     Forecast,
     expected_iterations,
-    first_seconds,
     forecast,
     foresee,
     memory_of,
-    step_seconds,
+    seconds,
 )
 from circuittex.study.rest import ENOUGH, Rest
 from circuittex.study.run import run_study
@@ -152,8 +151,9 @@ def test_memory_is_that_of_measured_weaves(size: Size, peak: float) -> None:
 # Seconds
 
 
-def test_iterations_grow_with_the_root_of_the_unknowns() -> None:
-    assert expected_iterations(4 * 7560) == pytest.approx(2 * expected_iterations(7560))
+@pytest.mark.parametrize("unknowns", [1800, WORTH_A_DESCENT])
+def test_iterations_grow_with_the_root_of_the_unknowns(unknowns: int) -> None:
+    assert expected_iterations(4 * unknowns) == pytest.approx(2 * expected_iterations(unknowns))
 
 
 @pytest.mark.parametrize("unknowns", [7560, WORTH_A_DESCENT + DOFS])
@@ -164,21 +164,12 @@ def test_a_machine_half_as_fast_takes_twice_as_long(unknowns: int) -> None:
 
 
 def test_a_descent_by_gradients_counts_where_there_is_one() -> None:
+    """There an iteration costs a gradient and a solution in place of all parts."""
     cost = made_up(WORTH_A_DESCENT // DOFS + 1)
     dear = replace(cost, gradient=2 * cost.gradient)
-    assert first_seconds(dear) > first_seconds(cost)
+    assert seconds(dear, 100.0, 4.0) - seconds(cost, 100.0, 4.0) == pytest.approx(100 * cost.gradient)
     cost = made_up(1000)
-    assert first_seconds(replace(cost, gradient=9.0)) == first_seconds(cost)
-
-
-def test_so_does_one_of_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    """From half as many unknowns on; there an iteration costs a gradient and a solution in place of all parts."""
-    cost = made_up(WORTH_A_DESCENT // 2 // DOFS + 1)
-    dear = replace(cost, gradient=2 * cost.gradient)
-    assert first_seconds(dear) == first_seconds(cost)
-    assert step_seconds(dear, 100) - step_seconds(cost, 100) == pytest.approx(100 * cost.gradient)
-    small = made_up(1000)
-    assert step_seconds(replace(small, gradient=9.0), 10) == step_seconds(small, 10)
+    assert seconds(replace(cost, gradient=9.0), 10.0, 4.0) == seconds(cost, 10.0, 4.0)
 
 
 def test_workers_share_cores_and_add_memory(monkeypatch: pytest.MonkeyPatch) -> None:

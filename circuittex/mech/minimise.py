@@ -117,9 +117,8 @@ def minimise(
     `PenetrationError` where a term cannot keep apart what it should.
     """
     system = System(terms, scales, fixed, len(q), motions=motions)
-    known: Solve | None = None
     if before is not None:
-        q, known = predict(system, solver, before, q)
+        q = predict(system, solver, before, q, rough=stride > 0.0)
     shift, place, refused, step, history = FIRST_SHIFT, 0, False, 1.0, []
     cheap = 0
     if stride > 0.0:
@@ -128,8 +127,8 @@ def minimise(
             system,
             solver,
             q,
-            known,
             stride=stride,
+            near=before is not None,
             limits=bounds,
             max_iterations=CHEAP * max_iterations,
             report=report,
@@ -197,13 +196,13 @@ def minimise(
     raise ConvergenceError(f"no equilibrium after {len(history) - 1} iterations: {trouble}", np.array(history))
 
 
-def predict(system: System, solver: LinearSolver, q: Floats, moved: Floats) -> tuple[Floats, Solve | None]:
-    """Where a minimum q (n_dofs,) goes to first order when its prescribed unknowns move to those of `moved`; and the
-    factor of its tangent, None where that is not positive definite.
+def predict(system: System, solver: LinearSolver, q: Floats, moved: Floats, *, rough: bool = False) -> Floats:
+    """Where a minimum q (n_dofs,) goes to first order when its prescribed unknowns move to those of `moved`; `rough` as
+    solvers take it.
 
     With the tangent K at q and the free unknowns f, the minimum moves by dq with (K dq)_f = 0; this is solved for the
-    difference to `moved`, a first guess. `moved` itself is returned where its potential is the lower one, or where the
-    way to the prediction is barred (`ForceTerm.longest`).
+    difference to `moved`, a first guess. `moved` itself is returned where its potential is the lower one, where the
+    tangent is not positive definite, or where the way to the prediction is barred (`ForceTerm.longest`).
 
     Raises `PenetrationError` where the way to `moved` is barred too.
     """
@@ -211,12 +210,12 @@ def predict(system: System, solver: LinearSolver, q: Floats, moved: Floats) -> t
         raise PenetrationError("the motion of the clamps would carry fibrils through one another")
     pattern, _, _ = system.assemble(q)
     force = system.free_force(multiply(pattern, system.data + system.softening, moved - q))
-    solve = system.factor(solver, FIRST_SHIFT, 1.0)
+    solve = system.factor(solver, FIRST_SHIFT, 1.0, rough=rough)
     if solve is None:
-        return moved, None
+        return moved
     predicted = moved - solve(force)
     lower = system.energy(predicted) < system.energy(moved)
-    return (predicted if lower and system.longest(q, predicted - q) == 1.0 else moved), solve
+    return predicted if lower and system.longest(q, predicted - q) == 1.0 else moved
 
 
 def _positive(

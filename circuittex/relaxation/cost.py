@@ -105,7 +105,7 @@ def measured_cost(
         solve(gradient)
     solved = clock()
     gradient_in = 0.0
-    if begins_with_gradients(space.n_dofs, step=True):
+    if begins_with_gradients(space.n_dofs):
         system.slope(q)  # with a search
         clock()
         system.slope(q)

@@ -32,9 +32,9 @@ from circuittex.relaxation.units import PLAIN, Units, own_units
 ROUGHLY = 1e-3
 """Tolerance of a descent with softer contacts than there are, which only leads near a minimum."""
 
-WORTH_A_DESCENT = 40_000
-"""Unknowns from which on a first relaxation begins with a descent by gradients. With 29,520 of them, 4 x 4 yarns of ten
-fibrils, it costs as much as Newton's method alone, with 50,184, 2 x 2 yarns of 34, and more a fraction
+WORTH_A_DESCENT = 15_000
+"""Unknowns from which on a relaxation begins with a descent by gradients. With 7,560 of them, 2 x 2 yarns of ten
+fibrils, it costs as much as Newton's method alone, with 16,740, 3 x 3 of them, half, and more a fraction
 (`benchmarks/size.py`)."""
 
 PATIENT = 100
@@ -61,12 +61,9 @@ class Equilibrium:
     """(Newton iterations + 1, 4) residual N, potential N mm, shift (`minimise`), step length, of the last descent."""
 
 
-def begins_with_gradients(n_dofs: int, *, step: bool = False) -> bool:
-    """Whether a relaxation of so many unknowns begins with a descent by gradients: the first, or a `step` of a path.
-
-    A step has a factor to begin with, so that half as many make it worth while.
-    """
-    return n_dofs >= (WORTH_A_DESCENT // 2 if step else WORTH_A_DESCENT)
+def begins_with_gradients(n_dofs: int) -> bool:
+    """Whether a relaxation of so many unknowns begins with a descent by gradients."""
+    return n_dofs >= WORTH_A_DESCENT
 
 
 def force_terms(mesh: FibrilMesh, design: Design, free_edges: str = "") -> tuple[BeamSpace, Beam, PenaltyContact]:
@@ -157,7 +154,7 @@ def _relaxed(
     scales = fibril_scales(space, design.weave.least_pitch, largest_penalty(mesh, design.contact))
     scales = replace(scales, newtons=units.force)
 
-    large = begins_with_gradients(space.n_dofs, step=before is not None)
+    large = begins_with_gradients(space.n_dofs)
 
     def descend(q: Floats, part: float, may_creep: bool, by_gradients: bool = large) -> Minimum:
         contact.part, true = part, part == 1.0

@@ -28,12 +28,12 @@ FIRST, OF_UNKNOWNS = 20.0, 7560
 """Iterations of Newton's method in a first relaxation of so many unknowns, 2 x 2 yarns; they go with the root of the
 unknowns: 20, 30, 83, 159 were counted for 2 x 2 to 16 x 16, where this gives 20, 40, 79, 157."""
 STEP = 1 / 3
-"""Iterations of a step of a loading path in parts of those."""
-GRADIENTS, BESIDE = 400, 10
-"""Iterations by gradients, and what factorisations and Newton's method take beside them in iterations of the latter,
-where a descent comes first: 315 to 600 of them were counted."""
-STEP_GRADIENTS, STEP_BESIDE = 120, 5
-"""The same for a step of a loading path: 58 to 224 of them were counted."""
+"""Iterations of a step of a loading path in parts of those, by either method: by gradients 16 to 82 were counted for
+4 x 4 yarns, 187 for 8 x 8."""
+GRADIENTS, BESIDE, STEP_BESIDE = 4.3, 8, 4
+"""Iterations by gradients for one of Newton's method, where a descent comes first (167, 330 and 577 were counted for
+4 x 4 to 16 x 16 yarns, where this gives 170, 338, 673), and what factorisations take beside them in iterations of the
+latter, in a first relaxation and a step."""
 TRIED = 1.2
 """What an iteration takes, in parts of one of each of its parts at the start: several factors may be tried, steps are
 searched, and contacts come. 0.6 to 2 were measured."""
@@ -96,12 +96,12 @@ def foresee(study: Study, workers: int) -> Forecast | None:
         check_memory(design, size, available)
 
     admit(Size(mesh.n_nodes, LEAST_ENTRIES * mesh.n_nodes, 0))
-    first = expected_iterations(DOFS * mesh.n_nodes)
+    newton = iterations_of_newton(DOFS * mesh.n_nodes)
     taken = [record.iterations for record in study.records if record.loading]
-    each = sum(taken) / len(taken) if taken else step_iterations(DOFS * mesh.n_nodes)
+    each = sum(taken) / len(taken) if taken else STEP * expected_iterations(DOFS * mesh.n_nodes)
     paths = len({step.loading for step in steps if step.loading})
     count = len(steps) if known else len(steps) - 1
-    nominal = (0.0 if known else first + RECORD) + count * (STEP * first + RECORD)
+    nominal = (0.0 if known else newton + RECORD) + count * (STEP * newton + RECORD)
     if NOMINAL * DOFS * mesh.n_nodes * nominal < MOMENTS:
         return None
     tiny = plain_weave(yarns=1, rows=(1,))
@@ -122,47 +122,34 @@ def forecast(cost: Cost, relaxed: bool, each: float, workers: int, available: in
     if available is not None and workers > 1:
         workers = max(1, min(workers, int((available - PROCESS) // one)))
     threads = max(1, available_cores() // workers)
-    slower = (available_cores() / threads) ** SHARED
+    slower, recording = (available_cores() / threads) ** SHARED, RECORD * cost.iteration
     return Forecast(
-        first=first_seconds(cost) + RECORD * cost.iteration if relaxed else 0.0,
-        step=slower * (step_seconds(cost, each) + RECORD * cost.iteration),
+        first=seconds(cost, expected_iterations(DOFS * cost.size.nodes), BESIDE) + recording if relaxed else 0.0,
+        step=slower * (seconds(cost, each, STEP_BESIDE) + recording),
         workers=workers,
         memory=workers * one + PROCESS if workers > 1 else one,
     )
 
 
 def expected_iterations(unknowns: int) -> float:
-    """Iterations of Newton's method that a first relaxation is expected to take.
+    """Iterations that a first relaxation is expected to take, by gradients where it begins with these.
 
     >>> [round(expected_iterations(n)) for n in (7560, 29520, 116640, 463680)]
-    [20, 40, 79, 157]
+    [20, 170, 338, 673]
     """
+    return (GRADIENTS if begins_with_gradients(unknowns) else 1.0) * iterations_of_newton(unknowns)
+
+
+def iterations_of_newton(unknowns: int) -> float:
+    """Iterations that a first relaxation is expected to take by Newton's method alone."""
     return FIRST * sqrt(unknowns / OF_UNKNOWNS)
 
 
-def step_iterations(unknowns: int) -> float:
-    """Iterations that a step of a loading path is expected to take, by gradients where it begins with these.
-
-    >>> [round(step_iterations(n)) for n in (7560, 29520)]
-    [7, 120]
-    """
-    by_gradients = begins_with_gradients(unknowns, step=True)
-    return STEP_GRADIENTS if by_gradients else STEP * expected_iterations(unknowns)
-
-
-def step_seconds(cost: Cost, iterations: float) -> float:
-    """What a step of a loading path takes in so many iterations, s."""
-    if begins_with_gradients(DOFS * cost.size.nodes, step=True):
-        return iterations * (cost.gradient + cost.solution) + STEP_BESIDE * TRIED * cost.iteration
+def seconds(cost: Cost, iterations: float, beside: float) -> float:
+    """What a relaxation takes in so many iterations, s; where these are by gradients, with `beside` of Newton's."""
+    if begins_with_gradients(DOFS * cost.size.nodes):
+        return iterations * (cost.gradient + cost.solution) + beside * TRIED * cost.iteration
     return TRIED * iterations * cost.iteration
-
-
-def first_seconds(cost: Cost) -> float:
-    """What the first relaxation is expected to take, s."""
-    unknowns, iteration = DOFS * cost.size.nodes, TRIED * cost.iteration
-    if begins_with_gradients(unknowns):
-        return GRADIENTS * (cost.gradient + cost.solution) + BESIDE * iteration
-    return expected_iterations(unknowns) * iteration
 
 
 def memory_of(size: Size) -> float:

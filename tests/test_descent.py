@@ -146,14 +146,14 @@ def test_a_step_of_a_path_ends_where_newtons_method_ends_it(monkeypatch: pytest.
     leaves a hundred times less than the descent does, where its limits are wide: it is Newton's but for the shift."""
     design, mesh = small_cell((1,), yarns=1, tolerance="1e-4 N")
     rest = relax(mesh, design)
-    stretched = np.diag([1.02, 1.0])
+    stretched = np.diag([1.05, 1.0])
     moved = move(rest.configuration, np.eye(2), stretched)
     tight = replace(design, numerics=replace(design.numerics, tolerance=f"{TIGHT} N"))
     alone = relax(mesh, tight, moved, before=rest.configuration, gradient=stretched)
     with_descent(monkeypatch)
     found = relax(mesh, design, moved, before=rest.configuration, gradient=stretched)
     assert len(found.history) == 1  # all by gradients
-    assert found.iterations > 1  # beside the prediction
+    assert found.iterations > 2
     assert found.residual < 1e-2 * found.history[-1][0] < 1e-2 * 1e-4
     assert np.abs(found.reaction - alone.reaction).max() < 1e-6
 

@@ -118,20 +118,16 @@ def on_plate(plate: str, pressure: float, law: Law, covered: float, across: floa
 
 def pressed() -> Comparison:
     coats = [1 / each for each in steel_films()]
-    steel, bare, more = [], [], []
+    steel, bare = [], []
     for covered, across in product(COVERED, ACROSS):
-        on_steel = [on_plate("steel", ON_STEEL, film, covered, across, coat) for coat in coats]
-        on_graphite = [on_plate("graphite", pressure, holm, covered, across) for pressure in ON_GRAPHITE]
-        steel += on_steel
-        bare += on_graphite
-        more += [one / other for one, other in product(on_steel, on_graphite)]
+        steel += [on_plate("steel", ON_STEEL, film, covered, across, coat) for coat in coats]
+        bare += [on_plate("graphite", pressure, holm, covered, across) for pressure in ON_GRAPHITE]
     points = (
         Point("carbon paper on graphite, 3 to 4 MPa", Band(4.0, 9.0), Band(min(bare), max(bare))),
         Point("carbon cloth on graphite, 3 to 4 MPa", Band(7.0, 13.0), Band(min(bare), max(bare))),
         Point("carbon on stainless steel, 2.06 MPa", Band(40.0, 50.0), Band(min(steel), max(steel))),
-        Point("stainless steel over graphite, paper", Band(40.0 / 9.0, 50.0 / 4.0), Band(min(more), max(more))),
     )
-    short = [1 / point.factor for point in points[:3]]
+    short = [1 / point.factor for point in points]
     fitted = [
         on_plate("steel", ON_STEEL, crossed, covered) / value for covered, value in product(COVERED, (40.0, 50.0))
     ]
@@ -164,12 +160,11 @@ def pressed() -> Comparison:
             Input("graphite plate", "15 uohm m, 10 GPa, 0.2", None, "handbooks; half of the constriction or less"),
             Input("stainless steel plate", "0.74 uohm m, 193 GPa, 0.29", None, "316L, handbooks; it hardly resists"),
         ),
-        computed="Hertz's strips of fibres that lie on the plate, the pressure shared among them: `holm` on graphite, `film` on steel. The band is that of the part covered, resistivities and films. "
-        "The last is the third over the first, in which the part covered, and what of it touches, counts less.",
-        unit="milliohm cm2, or ratio of two",
+        computed="Hertz's strips of fibres that lie on the plate, the pressure shared among them: `holm` on graphite, `film` on steel. The band is that of the part covered, resistivities and films.",
+        unit="milliohm cm2",
         points=points,
         meaning=f"Fibres that touched wherever they lie, as Hertz has it, would do {min(short):.0f} to {max(short):.0f} times better or more: as in the laminate above, but without its resin and at a stated pressure. "
-        "Paper and cloth are wavy and rough, and touch at few places. What steel has over graphite knows less of that: there the film of the rods does for a passive plate as well, as far as "
-        f"two laboratories and wide bands tell. Who fits `crossed` to the plate alone finds {min(fitted):.0f} to {max(fitted):.0f} S/mm2, some thousandth of it: that has in it how little touches. So neither Hertz's area nor a film "
+        "Paper and cloth are wavy and rough, and touch at few places. "
+        f"Who fits `crossed` to the plate alone finds {min(fitted):.0f} to {max(fitted):.0f} S/mm2, some thousandth of the film of the rods: that has in it how little touches. So neither Hertz's area nor a film "
         "from elsewhere gives the contact of a textile of carbon or steel in ohms: measure one, and state `power`.",
     )

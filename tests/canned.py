@@ -106,5 +106,6 @@ def untimed(study: Study) -> Study:
 
 
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Reports are written without their pictures, which take longer than a small cell and have tests of their own."""
+    """Reports and data sheets without their pictures, which take longer than a small cell and have their own tests."""
+    monkeypatch.setattr("circuittex.study.library.datasheet.save_figures", lambda *_: {})
     monkeypatch.setattr(import_module("circuittex.results.report.page"), "save_figures", lambda study, folder: {})

@@ -80,11 +80,22 @@ def test_no_equilibrium_and_a_bad_design_are_told_apart(folder: Path) -> None:
     assert shell(folder, "circuittex walk").returncode == ExitCode.USAGE
 
 
+UNDRAWN = """
+import sys
+from importlib import import_module
+from circuittex.command.cli import main
+import_module("circuittex.results.report.page").save_figures = lambda study, folder: {}
+sys.exit(main())
+"""
+"""The command line, but for the pictures of a report."""
+
+
 def test_a_simulator_that_is_absent_and_one_that_fails_are_told_apart(folder: Path) -> None:
+    (folder / "undrawn.py").write_text(UNDRAWN, encoding="utf-8")
     broken = folder / "broken"
     broken.write_text("#!/bin/sh\nexit 3\n")
     broken.chmod(0o755)
-    run = "circuittex run small.toml --quiet --out"
+    run = '"$PYTHON" undrawn.py run small.toml --quiet --out'
     assert shell(folder, f"{run} absent", CIRCUITTEX_NGSPICE="").returncode == ExitCode.DONE
     assert shell(folder, f"{run} failed", CIRCUITTEX_NGSPICE=str(broken)).returncode == ExitCode.SIMULATOR
     assert shell(folder, f"{run} there").returncode == ExitCode.DONE

@@ -31,6 +31,8 @@ from circuittex.study.panel.circuit import ports_netlist
 from circuittex.study.panel.reader import load_panel
 from circuittex.study.panel.solution import solve_panel
 
+pytestmark = pytest.mark.xdist_group("documentation")  # what its fixtures make serves one worker
+
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 SECONDS = 120

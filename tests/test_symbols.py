@@ -28,6 +28,8 @@ from circuittex.study.library.symbols.layout import layout
 from circuittex.study.library.symbols.ltspice import asy
 from circuittex.study.library.symbols.project import Divider, example_project
 
+pytestmark = pytest.mark.xdist_group("symbols")  # what its fixtures make serves one worker
+
 SAME = 1e-9
 """Relative: the same numbers through the same program, and a raw file's digits."""
 NAME = 'the "weave" (a) \\'

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -102,3 +103,9 @@ def untimed(study: Study) -> Study:
         study,
         records=tuple(replace(record, verification=replace(record.verification, **none)) for record in study.records),
     )
+
+
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports and data sheets without their pictures, which take longer than a small cell and have their own tests."""
+    monkeypatch.setattr("circuittex.study.library.datasheet.save_figures", lambda *_: {})
+    monkeypatch.setattr(import_module("circuittex.results.report.page"), "save_figures", lambda study, folder: {})

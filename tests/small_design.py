@@ -56,5 +56,8 @@ voltage = "1 V"
 elements = 8
 """
 
+BARE = SMALL[: SMALL.index("[terminals]")] + SMALL[SMALL.index("[numerics]") :]
+"""The same without probes: half the pictures of its report, and nothing to simulate."""
+
 NEVER = SMALL.replace("elements = 8", "elements = 8\nmax_iterations = 1")
 """The same with an iteration too few for any equilibrium."""

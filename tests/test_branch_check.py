@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from canned import Canned, canned_study
+from canned import Canned, canned_study, undrawn
 from fabrics import small_cell
 from synthetic_study import synthetic_study
 
@@ -46,8 +46,9 @@ def test_the_other_order_is_another_one(n: int) -> None:
     assert np.array_equal(permutation, another_permutation(n))
 
 
-def test_a_cell_that_keeps_its_branch(tmp_path: Path) -> None:
+def test_a_cell_that_keeps_its_branch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In two processes, each with the mesh and the states that it is sent, and kept in a file."""
+    undrawn(monkeypatch)
     design, _ = small_cell((1, 2), elements=4, tolerance="1e-8 N")
     design = replace(design, loading=(uniaxial("stretch", (0.05,)),))
     study = run_study(design, tmp_path, branches=True, workers=2)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from canned import undrawn
 
 from circuittex.command.cli import main
 from circuittex.command.exit_codes import ExitCode
@@ -23,7 +24,7 @@ from circuittex.results.store import load_study
 PAGE = (Path(__file__).parents[1] / "docs" / "choosing.md").read_text(encoding="utf-8")
 NYLON, STEEL, MIXED = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 AUTO = 'elements = "auto"\ncontact_points = "auto"'
-COARSE = "elements = 16\ncontact_points = 4"
+COARSE = "elements = 8\ncontact_points = 4"
 """For the nylon at rest: Ry does not depend on the contacts, and the whole of it takes minutes, as the page says."""
 SMALL_OVERLAP = 0.03
 """Force and conductance are of leading order in o / R, which is 0.013 here, and contact points miss the middle."""
@@ -40,7 +41,8 @@ def run(text: str, folder: Path, *doubted: str) -> Study:
     return study
 
 
-def test_nylon(tmp_path: Path) -> None:
+def test_nylon(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    undrawn(monkeypatch)
     assert NYLON.count(AUTO) == 1
     loading = NYLON[NYLON.index("[[loading]]") : NYLON.index("[terminals]")]
     study = run(NYLON.replace(AUTO, COARSE).replace(loading, ""), tmp_path, "mesh")
@@ -51,7 +53,8 @@ def test_nylon(tmp_path: Path) -> None:
     assert (np.isfinite(rest.fit.crossings) & (rest.fit.crossings > 100 * Ry)).all()
 
 
-def test_steel(tmp_path: Path) -> None:
+def test_steel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    undrawn(monkeypatch)
     study = run(STEEL, tmp_path)
     R, E, nu, sigma, k = 0.025, 200e3, 0.3, 1.4e3, 16e-3
     modulus = E / (2.0 * (1.0 - nu**2))

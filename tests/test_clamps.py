@@ -32,6 +32,8 @@ from circuittex.results.summary import table, write_summary
 from circuittex.study.error_estimate import estimate_error
 from circuittex.study.run import run_study
 
+pytestmark = pytest.mark.xdist_group("clamps")  # what its fixtures make serves one worker
+
 REST = np.eye(2)
 TIGHT = 1e-9  # N; forces are some 0.1 N, compliances below 10 mm/N: lengths to 1e-8 mm
 STRAIGHT = 1e-8  # N, that of `straight_cell`

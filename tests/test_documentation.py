@@ -17,6 +17,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from canned import undrawn
+from members_here import compute_here
 from test_paper_tables import STUDY, TABLE
 
 from circuittex.command.cli import main
@@ -29,6 +31,8 @@ from circuittex.study.panel.circuit import ports_netlist
 from circuittex.study.panel.reader import load_panel
 from circuittex.study.panel.solution import solve_panel
 
+pytestmark = pytest.mark.xdist_group("documentation")  # what its fixtures make serves one worker
+
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 SECONDS = 120
@@ -40,7 +44,7 @@ SMALLER = {
     "steps = 4": "steps = 1",
 }
 """What makes the delivered design a small one."""
-FEWER = {"--members 32": "--members 2", "members=32": "members=2"}
+FEWER = {"--members 32": "--members 2", "members=32": "members=1", "rows=(2, 3)": "rows=(1, 2)"}
 """What a page asks for, and what is enough to see that it works."""
 PROSE = {"text", "{eval-rst}", "{toctree}", "{include}"}
 """Blocks in which there is nothing to run."""
@@ -73,6 +77,7 @@ COMMANDS = sorted(
     {line.partition(" # ")[0].strip() for _, inner in shown("console") for line in inner.splitlines() if line.strip()}
 )
 DIFFERENT = sorted({alike(command): command for command in COMMANDS if command.startswith("circuittex ")}.values())
+(RUN,) = (command for command in DIFFERENT if re.fullmatch(r"circuittex run \S+ --out \S+", command))
 PYTHON = [(name, inner) for name, inner in shown("python") if name != "README.md"]  # test_readme.py has that one
 
 
@@ -88,26 +93,37 @@ def small() -> str:
 
 @pytest.fixture(scope="module")
 def computed(small: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The results of the small design."""
+    """The results of the small design, by the command that the pages show."""
     folder = tmp_path_factory.mktemp("computed")
-    (folder / "small.toml").write_text(small, encoding="utf-8")
-    assert main(["run", str(folder / "small.toml"), "--out", str(folder / "out"), "--quiet"]) == ExitCode.DONE
-    return folder / "out"
+    _, *words = shlex.split(RUN)
+    (folder / words[1]).write_text(small, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert main(words) == ExitCode.DONE
+    return folder / words[3]
+
+
+@pytest.fixture(scope="module")
+def original(small: str, computed: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Designs and results under the names of the documentation."""
+    folder = tmp_path_factory.mktemp("original")
+    (folder / "examples").mkdir()
+    for name in ("weave", "examples/plain_weave", "examples/paper", "examples/paper_table"):
+        (folder / f"{name}.toml").write_text(small, encoding="utf-8")
+    shutil.copy(ROOT / "examples" / "heater_panel.toml", folder / "examples")
+    for name in ("weave", "plain_weave"):
+        shutil.copytree(computed, folder / "results" / name)
+    shutil.copytree(computed, folder / "results" / "packings-ensemble" / "members" / "0000")
+    for name, study in (("paper", STUDY), ("paper_table", TABLE)):  # their cell is no small one
+        (folder / "results" / name).mkdir()
+        write_study_start(folder / "results" / name / "results.h5", study)
+    return folder
 
 
 @pytest.fixture
-def folder(small: str, computed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where a reader is: designs and results under the names of the documentation."""
-    (tmp_path / "examples").mkdir()
-    for name in ("weave", "examples/plain_weave", "examples/paper", "examples/paper_table"):
-        (tmp_path / f"{name}.toml").write_text(small, encoding="utf-8")
-    shutil.copy(ROOT / "examples" / "heater_panel.toml", tmp_path / "examples")
-    for name in ("weave", "plain_weave"):
-        shutil.copytree(computed, tmp_path / "results" / name)
-    shutil.copytree(computed, tmp_path / "results" / "packings-ensemble" / "members" / "0000")
-    for name, study in (("paper", STUDY), ("paper_table", TABLE)):  # their cell is no small one
-        (tmp_path / "results" / name).mkdir()
-        write_study_start(tmp_path / "results" / name / "results.h5", study)
+def folder(original: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where a reader is: a copy of all that, in which a test may do what it likes."""
+    shutil.copytree(original, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -135,12 +151,25 @@ def test_files_that_commands_name_are_delivered() -> None:
     assert [name for name in sorted(named) if not (ROOT / name).is_file()] == []
 
 
-@pytest.mark.parametrize("command", DIFFERENT)
-def test_command(command: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_run(computed: Path) -> None:
+    """What the fixture ran."""
+    for name in ("report.html", "summary.json", "results.h5", "figures", "netlists", "vtu"):
+        assert (computed / name).exists()
+    assert len(load_study(computed / "results.h5").records) == 2
+
+
+@pytest.mark.parametrize("command", [command for command in DIFFERENT if command != RUN])
+def test_command(
+    command: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Pictures are those of `test_run` and of `circuittex report`; the members of an ensemble, which a script computes
+    in processes of their own below, are computed in this one."""
     before, _, file = fewer(command).partition(" > ")
     words = shlex.split(before)[1:]
-    if words[0] == "run" and len(words) == 4:  # with further options it completes what is there
-        shutil.rmtree(folder / words[3], ignore_errors=True)
+    if words[0] != "report" or "--beside" in words:
+        undrawn(monkeypatch)
+    if words[0] == "ensemble":
+        compute_here(monkeypatch)
     if words[-1] == "--help":
         with pytest.raises(SystemExit, match="0"):
             main(words)
@@ -152,9 +181,7 @@ def test_command(command: str, folder: Path, capsys: pytest.CaptureFixture[str])
         assert load_design(folder / file).name
         assert out == starter(words[2] if words[1:2] == ["--fabric"] else "")
     if words[0] == "run":
-        assert all(
-            (Path(words[3]) / name).exists() for name in ("report.html", "summary.json", "results.h5", "figures")
-        )
+        assert all((Path(words[3]) / name).exists() for name in ("report.html", "summary.json", "results.h5"))
         assert len(load_study(Path(words[3]) / "results.h5").records) == 2
 
 

@@ -41,6 +41,8 @@ from circuittex.study.kit import write_kit
 from circuittex.study.library.export import export_library
 from circuittex.study.run import run_study
 
+pytestmark = pytest.mark.xdist_group("drive")  # what its fixtures make serves one worker
+
 EXACT = 1e-12
 """Relative: one linear solution in double precision, of some hundred unknowns whose conductances are alike."""
 ROUTES = 1e-9

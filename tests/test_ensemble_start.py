@@ -21,6 +21,8 @@ from circuittex.study.ensemble.perturbation import member_design, perturbed
 from circuittex.study.ensemble.start import member_starts
 from circuittex.study.run import run_study
 
+pytestmark = pytest.mark.xdist_group("ensemble_start")  # what its fixtures make serves one worker
+
 TINY = plain_weave(yarns=2, rows=(1, 2), loading=(uniaxial("stretch", (0.02,)),))
 TINY = replace(TINY, numerics=replace(TINY.numerics, elements=4), probes=(), terminals=())
 STIFFER = replace(TINY, name="stiffer", contact=replace(TINY.contact, penalty=5.5), loading=())

@@ -34,6 +34,8 @@ from circuittex.results.store import load_study
 from circuittex.study.error_estimate import estimate_error, estimates, variants
 from circuittex.study.run import run_study
 
+pytestmark = pytest.mark.xdist_group("error_estimate")  # what its fixtures make serves one worker
+
 Cell = tuple[Design, FibrilMesh, Record]
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from canned import undrawn
 from fabrics import small_cell
 from synthetic_study import with_network
 
@@ -35,7 +36,9 @@ FIT = with_network(Fit(0.3, 200.0, 0.0, np.zeros((2, 2)), "relative", (), np.zer
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Study]:
     """The cell of the documentation's example, on fewer elements."""
     folder = tmp_path_factory.mktemp("study")
-    return folder, run_study(small_cell(yarns=4, elements=4)[0], folder)
+    with pytest.MonkeyPatch.context() as patch:
+        undrawn(patch)
+        return folder, run_study(small_cell(yarns=4, elements=4)[0], folder)
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from canned import undrawn
 
 from circuittex.base.arrays import Floats, Ints
 from circuittex.base.errors import CircuittexWarning, DesignError
@@ -33,6 +34,8 @@ from circuittex.results.summary import summary
 from circuittex.study.kit import write_kit
 from circuittex.study.library.export import export_library
 from circuittex.study.run import run_study
+
+pytestmark = pytest.mark.xdist_group("heated_study")  # what its fixtures make serves one worker
 
 ROUTES = 1e-9
 """Relative: what routes may differ by (`AGREEMENT`), ngspice among them."""
@@ -214,8 +217,9 @@ def test_ratings_are_those_of_the_temperatures(heated: Study, linear: Study) -> 
 
 
 def test_commands_go_on_with_a_stored_study(
-    folder: Path, heated: Study, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, heated: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    undrawn(monkeypatch)
     assert main(["verify", str(folder)]) == ExitCode.DONE
     capsys.readouterr()
     deck = (folder / "netlists" / "relaxed_volts.cir").read_text(encoding="ascii")

@@ -23,6 +23,8 @@ from circuittex.electrical.spice.ngspice import find_ngspice
 from circuittex.netlist import read_deck, to_pyspice
 from circuittex.study.kit import FILES, small_circuit, write_kit
 
+pytestmark = pytest.mark.xdist_group("kit")  # what its fixtures make serves one worker
+
 CIRCUITS = ("small", "medium", "cell")
 
 

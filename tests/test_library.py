@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from canned import undrawn
 from library_cases import ohmmeter, pins_of, resistor_matrix, study
 
 from circuittex.base.arrays import Floats
@@ -33,6 +34,12 @@ PAIRS = [
     ("weft1_minus", "weft3_plus"),
     ("warp4_plus", "warp2_minus"),
 ]
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """But for what the module's fixtures export."""
+    undrawn(monkeypatch)
 
 
 @pytest.fixture(scope="module")
@@ -206,7 +213,9 @@ def test_the_way_back_is_a_part_of_its_own(tmp_path: Path) -> None:
 def corners(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Five packings that are the same but for all contacts and fibrils, which conduct 0.8 to 1.2 times as well."""
     folder = tmp_path_factory.mktemp("corners")
-    export_library(STUDY, folder, members=[scaled(factor) for factor in FACTORS], dialects=("ngspice",))
+    with pytest.MonkeyPatch.context() as patch:
+        undrawn(patch)
+        export_library(STUDY, folder, members=[scaled(factor) for factor in FACTORS], dialects=("ngspice",))
     return folder / "ngspice"
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from canned import undrawn
 from gnucap import GNUCAP, needs_gnucap
 from hypothesis import given
 from hypothesis import strategies as st
@@ -47,6 +48,12 @@ NAME = "fabric_ports_stretch_x_shear"
 GNUCAP_SUFFIX = {"K": 1e3, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
 GNUCAP_SOURCE = 1e-4
 """V: gnucap's sources have a small resistance of their own."""
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """But for what the module's fixtures export."""
+    undrawn(monkeypatch)
 
 
 @pytest.fixture(scope="module")

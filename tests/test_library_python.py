@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from canned import undrawn
 from library_cases import CELLS, answer, direct, listed, pins_of, study
 
 from circuittex.base.errors import CircuitError
@@ -23,7 +24,9 @@ NAMES = [f"fabric_{end}" for end in CELLS]
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("library")
-    export_library(study(3), folder, dialects=("ngspice",))
+    with pytest.MonkeyPatch.context() as patch:
+        undrawn(patch)
+        export_library(study(3), folder, dialects=("ngspice",))
     return folder
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from canned import undrawn
 from gnucap import needs_gnucap
 from library_cases import listed, ohmmeter, pins_of, resistor_matrix, study
 
@@ -71,12 +72,18 @@ def law(tc: tuple[float, float], dT: float) -> float:
     return 1.0 + tc[0] * dT + tc[1] * dT**2
 
 
+@pytest.fixture(autouse=True)
+def _nothing_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """But for what the module's fixtures export."""
+    undrawn(monkeypatch)
+
+
 @pytest.fixture(scope="module")
 def warm(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Study]:
     folder = tmp_path_factory.mktemp("warm")
     made = warm_study(FIBRIL, CONTACT)
     with pytest.MonkeyPatch.context() as monkeypatch:
-        monkeypatch.setattr("circuittex.study.library.datasheet.save_figures", lambda *_: {})
+        undrawn(monkeypatch)
         export_library(made, folder, dialects=("ngspice", "gnucap"))
     assert "Resistance against temperature" in (folder / "datasheet.html").read_text("utf-8")
     return folder, made

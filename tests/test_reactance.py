@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from canned import undrawn
 from gnucap import needs_gnucap
 from library_cases import pins_of, study
 from numpy.typing import NDArray
@@ -166,7 +167,9 @@ def libraries(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     plain, reactive = (tmp_path_factory.mktemp(name) for name in ("plain", "reactive"))
     made = study(4)
     dialects = ("ngspice", "gnucap")
-    export_library(made, plain, dialects=dialects)
+    with pytest.MonkeyPatch.context() as patch:
+        undrawn(patch)
+        export_library(made, plain, dialects=dialects)
     export_library(made, reactive, dialects=dialects, reactive=True)
     return plain, reactive
 

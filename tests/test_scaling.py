@@ -27,6 +27,8 @@ from circuittex.relaxation.relax import Equilibrium, relax
 from circuittex.study.circuits import conducting_ends
 from circuittex.study.export import simplified
 
+pytestmark = pytest.mark.xdist_group("scaling")  # what its fixtures make serves one worker
+
 RANGE = range(-12, 11)
 """Exponents of two: from 1/4096 to 1024."""
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from canned import undrawn
 from fabrics import fibrils_through, small_cell, straight
 from plan_view import side
 from synthetic_study import synthetic_study
@@ -289,8 +290,11 @@ def test_slack_fibrils_keep_their_sides_whatever_the_number_of_steps(steps: int)
         np.testing.assert_array_equal(seen, draft)
 
 
-def test_a_penalty_too_soft_for_its_fibrils_ends_the_run_with_nothing_recorded(tmp_path: Path) -> None:
+def test_a_penalty_too_soft_for_its_fibrils_ends_the_run_with_nothing_recorded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Case 01: fibrils of 3 GPa held apart by 5 N/mm2."""
+    undrawn(monkeypatch)
     design, _ = small_cell((1,), elements=10)
     yarn = design.weave.warp[0]
     stiff = replace(yarn, materials=tuple(replace(m, youngs_modulus=3e3) for m in yarn.materials))

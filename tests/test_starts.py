@@ -18,6 +18,8 @@ from circuittex.mech.configuration import Configuration, initial_configuration
 from circuittex.relaxation.relax import Equilibrium, relax
 from circuittex.relaxation.starts import check_start, from_state, laid_out, repeat, repeated_cell, tiled
 
+pytestmark = pytest.mark.xdist_group("starts")  # what its fixtures make serves one worker
+
 SAME = 1e-7
 """Relative: energies of two equilibria that are one, each within the tolerance of 2e-5 of the forces, which enters an
 energy squared."""

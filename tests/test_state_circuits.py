@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from canned import undrawn
 from small_design import SMALL
 from synthetic import woven
 
@@ -55,6 +56,7 @@ def test_the_circuits_are_those_of_a_construction_each(yarns: tuple[int, ...]) -
 
 def test_a_study_builds_each_circuit_of_a_state_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """All contacts and the simplified ones, each laid out once: on either the probes, on the latter the yarn ends."""
+    undrawn(monkeypatch)
     built = {"_resistors_apart": 0, "_joined": 0}
 
     def counted(name: str) -> None:

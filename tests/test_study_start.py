@@ -24,6 +24,8 @@ from circuittex.results.summary import summary
 from circuittex.study import start as starts
 from circuittex.study.run import run_study
 
+pytestmark = pytest.mark.xdist_group("study_start")  # what its fixtures make serves one worker
+
 STUDY = canned_study(2)
 COPIES = "tiled, from 2 x 2 yarns"
 WIDE = SMALL.replace("[[0, 1], [1, 0]]", "[[0, 1, 0, 1], [1, 0, 1, 0]]")

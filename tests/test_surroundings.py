@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from small_design import NEVER, SMALL
+from small_design import BARE, NEVER, SMALL
 
 import circuittex
 from circuittex.command.exit_codes import ExitCode
@@ -35,6 +35,7 @@ def shell(folder: Path, command: str, **environment: str | None) -> subprocess.C
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "small.toml").write_text(SMALL, encoding="utf-8")
+    (tmp_path / "bare.toml").write_text(BARE, encoding="utf-8")
     (tmp_path / "never.toml").write_text(NEVER, encoding="utf-8")
     return tmp_path
 
@@ -48,7 +49,7 @@ def test_the_backend_of_a_notebook_that_is_not_installed_here(folder: Path, back
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", ">&- 2>&-"])
 def test_closed_streams(folder: Path, closed: str) -> None:
-    done = shell(folder, f"circuittex run small.toml --out o {closed}")
+    done = shell(folder, f"circuittex run bare.toml --out o {closed}")
     assert done.returncode == ExitCode.DONE
     assert (folder / "o" / "summary.json").exists()
 
@@ -62,7 +63,7 @@ def test_a_starter_design_is_utf8_whatever_the_encoding_of_the_terminal(folder: 
 
 
 def test_names_that_the_terminal_cannot_show(folder: Path) -> None:
-    done = shell(folder, "circuittex run small.toml --out Köper", PYTHONIOENCODING="ascii", PYTHONUTF8="0")
+    done = shell(folder, "circuittex run bare.toml --out Köper", PYTHONIOENCODING="ascii", PYTHONUTF8="0")
     assert done.returncode == ExitCode.DONE
     assert b"report: K\\xf6per" in done.stdout
 
@@ -79,11 +80,22 @@ def test_no_equilibrium_and_a_bad_design_are_told_apart(folder: Path) -> None:
     assert shell(folder, "circuittex walk").returncode == ExitCode.USAGE
 
 
+UNDRAWN = """
+import sys
+from importlib import import_module
+from circuittex.command.cli import main
+import_module("circuittex.results.report.page").save_figures = lambda study, folder: {}
+sys.exit(main())
+"""
+"""The command line, but for the pictures of a report."""
+
+
 def test_a_simulator_that_is_absent_and_one_that_fails_are_told_apart(folder: Path) -> None:
+    (folder / "undrawn.py").write_text(UNDRAWN, encoding="utf-8")
     broken = folder / "broken"
     broken.write_text("#!/bin/sh\nexit 3\n")
     broken.chmod(0o755)
-    run = "circuittex run small.toml --quiet --out"
+    run = '"$PYTHON" undrawn.py run small.toml --quiet --out'
     assert shell(folder, f"{run} absent", CIRCUITTEX_NGSPICE="").returncode == ExitCode.DONE
     assert shell(folder, f"{run} failed", CIRCUITTEX_NGSPICE=str(broken)).returncode == ExitCode.SIMULATOR
     assert shell(folder, f"{run} there").returncode == ExitCode.DONE
@@ -108,7 +120,10 @@ if what in ("fsync", "both"):
     os.fsync = no_folders
 if what in ("flock", "both"):
     fcntl.flock = fcntl.lockf = refuse
+from importlib import import_module
 from circuittex.command.cli import main
+if what != "both":  # pictures are written as any other file: once is enough
+    import_module("circuittex.results.report.page").save_figures = lambda study, folder: {}
 sys.exit(main(["run", "small.toml", "--out", "o", "--quiet", "--workers", "1"]))
 """
 """As some FUSE, SMB and 9p mounts do, and NFS without its lock daemon."""

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from canned import undrawn
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kicad_netlist import card, fields, netlist, pins
@@ -27,9 +28,17 @@ from circuittex.study.library.symbols.layout import layout
 from circuittex.study.library.symbols.ltspice import asy
 from circuittex.study.library.symbols.project import Divider, example_project
 
+pytestmark = pytest.mark.xdist_group("symbols")  # what its fixtures make serves one worker
+
 SAME = 1e-9
 """Relative: the same numbers through the same program, and a raw file's digits."""
 NAME = 'the "weave" (a) \\'
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """But for what the module's fixtures export."""
+    undrawn(monkeypatch)
 
 
 @pytest.fixture(scope="module")

@@ -32,6 +32,8 @@ from circuittex.study import unfinished as unfinished_module
 from circuittex.study.run import run_study
 from circuittex.study.unfinished import UNFINISHED, unfinished
 
+pytestmark = pytest.mark.xdist_group("unfinished")  # what its fixtures make serves one worker
+
 APART = 16
 """Iterations between checkpoints here: the cells take some 20 to 70."""
 PATIENCE = 600.0

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from canned import undrawn
 from fabrics import Cell, fibrils_through, renumbered, small_cell, straight
 
 from circuittex.base.arrays import Floats
@@ -232,7 +233,9 @@ def test_the_insulated_yarn_through_fields_circuit_ngspice_and_fit() -> None:
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Study]:
     design, _ = small_cell(elements=4)
     folder = tmp_path_factory.mktemp("study")
-    return folder, run_study(replace(design, loading=(uniaxial("stretch", (0.05,)),)), folder)
+    with pytest.MonkeyPatch.context() as patch:
+        undrawn(patch)
+        return folder, run_study(replace(design, loading=(uniaxial("stretch", (0.05,)),)), folder)
 
 
 def test_a_study_reloads_from_its_file_as_it_was(finished: tuple[Path, Study]) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from canned import undrawn
 from small_design import SMALL
 
 from circuittex.base.errors import DesignError
@@ -247,8 +248,11 @@ def drive(each: Any) -> dict[str, float]:
     return {"current": each.rated_current}
 
 
-def test_a_stored_study_goes_on(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_stored_study_goes_on(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Commands on results know the voltages; libraries rate for the rise that the design states."""
+    undrawn(monkeypatch)
     assert main(["verify", str(folder)]) == ExitCode.DONE
     capsys.readouterr()
     deck = (folder / "netlists" / "relaxed_amperes.cir").read_text(encoding="ascii")

@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 import subprocess
+from functools import cache
 from itertools import product
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from hypothesis import strategies as st
 from library_cases import CARD, pins_of, study, with_both
 
 from circuittex.electrical.network.names import safe_name
-from circuittex.electrical.spice.ngspice import TROUBLE, find_ngspice, read_raw, run_deck
+from circuittex.electrical.spice.ngspice import TROUBLE, Plot, find_ngspice, read_raw, run_deck
 from circuittex.study.library.cell import DIALECTS, Cell, Pin
 from circuittex.study.library.export import export_library
 from circuittex.study.library.network import Network
@@ -224,6 +225,13 @@ def test_ngspice_runs_every_example(library: Path) -> None:
         assert deck.name.startswith("probe") or "i_stretched" in done.stdout or "v1#branch" in done.stdout
 
 
+@cache
+def own(library: Path, name: str) -> Plot:
+    """What ngspice answers to an example in its own dialect."""
+    text = (library / "examples" / name).read_text("ascii")
+    return run_deck(text.replace("../", f"{library}/")).plots[-1]
+
+
 @pytest.mark.parametrize("dialect", ["ltspice", "xyce"])
 def test_ngspice_that_follows_ltspice_runs_the_examples_of_others(
     library: Path, dialect: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -242,8 +250,7 @@ def test_ngspice_that_follows_ltspice_runs_the_examples_of_others(
         command = [str(find_ngspice()), "-b", "-r", str(raw), deck.name]
         done = subprocess.run(command, cwd=deck.parent, capture_output=True, text=True, timeout=SECONDS)
         assert "Compatibility modes selected: ps lt" in done.stdout + done.stderr
-        own = (library / "examples" / deck.name.replace(dialect, "ngspice")).read_text("ascii")
-        found, wanted = read_raw(raw)[-1], run_deck(own.replace("../", f"{library}/")).plots[-1]
+        found, wanted = read_raw(raw)[-1], own(library, deck.name.replace(dialect, "ngspice"))
         np.testing.assert_allclose(found.current("v1"), wanted.current("v1"), rtol=1e-9)
 
 
@@ -257,12 +264,10 @@ def test_gnucap_reads_every_file_and_answers_as_ngspice(library: Path) -> None:
             [str(GNUCAP), "-b", deck.name], cwd=deck.parent, capture_output=True, text=True, timeout=SECONDS
         )
         last = done.stdout.strip().splitlines()[-1].split()
-        same = run_deck(
-            (library / "examples" / deck.name.replace("gnucap", "ngspice")).read_text().replace("../", f"{library}/")
-        )
+        same = own(library, deck.name.replace("gnucap", "ngspice"))
         found = last[1] if "v2" in deck.read_text("ascii").lower() else last[2]
         found = re.sub("[munp]$", lambda unit: SUFFIXES[unit[0]], found)
-        assert float(found) == pytest.approx(float(same.plots[-1].current("v1")[0]), rel=1e-3)
+        assert float(found) == pytest.approx(float(same.current("v1")[0]), rel=1e-3)
 
 
 def test_the_two_kinds_of_yarn_ends_are_the_decks_of_their_names(library: Path) -> None:

@@ -18,7 +18,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from canned import undrawn
-from members_here import compute_here
 from test_paper_tables import STUDY, TABLE
 
 from circuittex.command.cli import main
@@ -162,14 +161,11 @@ def test_run(computed: Path) -> None:
 def test_command(
     command: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Pictures are those of `test_run` and of `circuittex report`; the members of an ensemble, which a script computes
-    in processes of their own below, are computed in this one."""
+    """Pictures are those of `test_run` and of `circuittex report`."""
     before, _, file = fewer(command).partition(" > ")
     words = shlex.split(before)[1:]
     if words[0] != "report" or "--beside" in words:
         undrawn(monkeypatch)
-    if words[0] == "ensemble":
-        compute_here(monkeypatch)
     if words[-1] == "--help":
         with pytest.raises(SystemExit, match="0"):
             main(words)

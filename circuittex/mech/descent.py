@@ -30,7 +30,8 @@ LASTS = 30
 """Iterations after which the factor is renewed: with 60, 4 x 4 yarns take 206 iterations for 169, 8 x 8 364 for 315."""
 SHORT, TIRED = 0.05, 4
 """A factor is renewed early after so many steps in a row that were shorter than this part of what it directed to: it
-knows nothing of contacts that have come since. Steps of 2.5 % of 4 x 4 yarns take 244 iterations for 398 in all."""
+knows nothing of contacts that have come since. With this and `NEAR`, six steps of 2 and 2.5 % of 4 x 4 yarns take 240
+iterations for 398."""
 APART = 60
 """Iterations from one place to the next renewal at which all that is remembered of earlier ones is forgotten
 (`Checkpoint`). Most of that is out of date by then: with 8 x 8 yarns it costs 2 searches for contacts in 26, 0.3 % of

@@ -29,11 +29,11 @@ FIRST, OF_UNKNOWNS = 20.0, 7560
 unknowns: 20, 30, 83, 159 were counted for 2 x 2 to 16 x 16, where this gives 20, 40, 79, 157."""
 STEP = 1 / 3
 """Iterations of a step of a loading path in parts of those, by either method: by gradients 16 to 82 were counted for
-4 x 4 yarns, 187 for 8 x 8."""
+4 x 4 yarns, 187 and 337 for 8 x 8."""
 GRADIENTS, BESIDE, STEP_BESIDE = 4.3, 8, 4
-"""Iterations by gradients for one of Newton's method, where a descent comes first (167, 330 and 577 were counted for
-4 x 4 to 16 x 16 yarns, where this gives 170, 338, 673), and what factorisations take beside them in iterations of the
-latter, in a first relaxation and a step."""
+"""Iterations by gradients for one of Newton's method, where a descent comes first (170, 314 and 577 to 799 were counted
+for 4 x 4 to 16 x 16 yarns, where this gives 170, 338, 673), and what factorisations take beside them in iterations of
+the latter, in a first relaxation and a step."""
 TRIED = 1.2
 """What an iteration takes, in parts of one of each of its parts at the start: several factors may be tried, steps are
 searched, and contacts come. 0.6 to 2 were measured."""
@@ -47,7 +47,7 @@ core of two."""
 PROCESS, OF_ENTRIES, OF_FACTOR = 290e6, 17 * 8, 2 * 8
 """Bytes that a process needs at its most: for itself, for each entry of the pattern at the start, and for each value of
 its factor then. Entries come to be up to 1.1 times as many, values 1.0 to 1.9 times, as contacts come; arrays live
-beside one another. Peaks of weaves of 7,560 to 463,680 unknowns are 0.7 to 1 times what this gives; that of a crossing
+beside one another. Peaks of weaves of 7,560 to 463,680 unknowns are 0.6 to 1 times what this gives; that of a crossing
 of two yarns of 300 filaments, to which most contacts come later, is 1.03 times."""
 LEAST_ENTRIES, LEAST_FILL = 126, 3
 """Entries of a node that touches nothing, of linear elements, and values of the factor for each entry: 3.6 to 11 were

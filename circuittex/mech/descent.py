@@ -30,7 +30,7 @@ LASTS = 30
 """Iterations after which the factor is renewed: with 60, 4 x 4 yarns take 206 iterations for 169, 8 x 8 364 for 315."""
 SHORT, TIRED = 0.05, 4
 """A factor is renewed early after so many steps in a row that were shorter than this part of what it directed to: it
-knows nothing of contacts that have come since. With this and `NEAR`, six steps of 2 and 2.5 % of 4 x 4 yarns take 240
+knows nothing of contacts that have come since. With this and `NEAR`, six steps of 2 and 2.5 % of 4 x 4 yarns take 218
 iterations for 398."""
 APART = 60
 """Iterations from one place to the next renewal at which all that is remembered of earlier ones is forgotten

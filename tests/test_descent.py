@@ -16,7 +16,7 @@ from circuittex.design import Design
 from circuittex.geometry.mesh import FibrilMesh
 from circuittex.geometry.weave import build_mesh
 from circuittex.mech.configuration import Configuration, initial_configuration
-from circuittex.mech.descent import descend
+from circuittex.mech.descent import TIRED, descend
 from circuittex.mech.minimise import Minimum, minimise
 from circuittex.mech.multifrontal import MultifrontalSolver
 from circuittex.mech.pattern import DOFS, Pattern
@@ -36,6 +36,7 @@ class Witness:
     presses_from: int = 10**9
     """The question from which on it says that fibrils are pressed through one another."""
     ways: list[tuple[Floats, Floats]] = field(default_factory=list)
+    assemblies: int = 0
 
     def prepare(self, q: Floats) -> bool:
         return False
@@ -59,17 +60,18 @@ class Witness:
         return self.part
 
     def assemble(self, q: Floats, pattern: Pattern, gradient: Floats, data: Floats, softening: Floats) -> float:
+        self.assemblies += 1
         return 0.0
 
 
-def descended(witness: Witness, stride: float) -> tuple[System, Floats, Floats, int]:
+def descended(witness: Witness, stride: float, most: int = 1500) -> tuple[System, Floats, Floats, int]:
     """System, first and last unknowns and iterations of a descent in a cell of three fibrils a yarn."""
     design, mesh = small_cell()
     space, beam, contact = force_terms(mesh, design)
     start = space.vector(initial_configuration(mesh))
     scales = fibril_scales(space, design.weave.least_pitch, 5.0)
     system = System([beam, contact, witness], scales, space.fixed, len(start))
-    q, count = descend(system, MultifrontalSolver(), start, stride=stride, limits=(2e-5, 0.0), max_iterations=1500)
+    q, count = descend(system, MultifrontalSolver(), start, stride=stride, limits=(2e-5, 0.0), max_iterations=most)
     return system, start, q, count
 
 
@@ -101,6 +103,39 @@ def test_it_ends_where_forces_are_below_their_limits() -> None:
     assert count > 10
     # The limits are those of the last renewal, and the forces that they are parts of differ by less than twice since.
     assert (system.scales.forces(gradient) <= 2 * system.limits(q, 2e-5, 0.0)).all()
+
+
+@pytest.mark.parametrize(("part", "renewals"), [(1.0, 1), (0.04, 20 // TIRED)])
+def test_a_factor_whose_steps_are_all_short_is_renewed_early(part: float, renewals: int) -> None:
+    """Where nothing bars the way it serves for all of twenty steps; where all but a thirtieth is barred, for four."""
+    witness = Witness(part)
+    descended(witness, 0.15, 20)
+    assert witness.assemblies == renewals
+
+
+def test_the_last_factor_of_a_place_takes_the_values_and_they_can_be_had_again() -> None:
+    """To the last bit; and a factor that is not the last leaves them."""
+    design, mesh = small_cell()
+    space, beam, contact = force_terms(mesh, design)
+    q = space.vector(initial_configuration(mesh))
+    system = System([beam, contact], fibril_scales(space, design.weave.least_pitch, 5.0), space.fixed, len(q))
+    system.assemble(q)
+    before = [system.data, system.softening, system.metric]
+    one = system.factor(MultifrontalSolver(), 1e6, 1.0)
+    assert all(
+        here is there for here, there in zip(before, (system.data, system.softening, system.metric), strict=True)
+    )
+    two = system.factor(MultifrontalSolver(), 1e6, 1.0, last=True)
+    assert not system.data.size
+    assert not system.softening.size
+    assert not system.metric.size
+    assert one is not None
+    assert two is not None
+    force = np.where(system.free, 1.0, 0.0)
+    assert np.array_equal(one(force), two(force))
+    system.assemble(q)
+    again = system.data, system.softening, system.metric
+    assert all(np.array_equal(here, there) for here, there in zip(before, again, strict=True))
 
 
 def test_it_stops_short_of_a_step_that_presses_fibrils_through_one_another() -> None:

@@ -24,7 +24,7 @@ from circuittex.results.store import load_study
 PAGE = (Path(__file__).parents[1] / "docs" / "choosing.md").read_text(encoding="utf-8")
 NYLON, STEEL, MIXED = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 AUTO = 'elements = "auto"\ncontact_points = "auto"'
-COARSE = "elements = 8\ncontact_points = 4"
+COARSE = "elements = 16\ncontact_points = 4"
 """For the nylon at rest: Ry does not depend on the contacts, and the whole of it takes minutes, as the page says."""
 SMALL_OVERLAP = 0.03
 """Force and conductance are of leading order in o / R, which is 0.013 here, and contact points miss the middle."""

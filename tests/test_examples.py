@@ -21,7 +21,7 @@ SECONDS = 120
 """For a process of its own on a loaded machine, compilation included; alone it takes some seconds."""
 SMALLER = {
     "circuit_as_graph": {"yarns=2)": "yarns=2, rows=(2,))"},
-    "ensemble_in_pandas": {"members=4": "members=1"},
+    "ensemble_in_pandas": {"members=4": "members=2"},
     "own_loading_path": {"rows=(1, 2)": "rows=(1,)"},
 }
 """What takes long in a script, and what is enough to see that it works."""

@@ -291,7 +291,7 @@ PIECES = (
 EVIL = st.lists(st.sampled_from(PIECES) | st.text(max_size=8), max_size=6).map("".join)
 
 
-@settings(max_examples=1000)
+@settings(max_examples=10_000)
 @given(EVIL, EVIL, EVIL)
 def test_no_text_of_a_design_becomes_a_card(name: str, title: str, state: str) -> None:
     harmless(name, title, state)

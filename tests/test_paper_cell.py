@@ -20,9 +20,9 @@ from circuittex.relaxation.relax import clamp_force, relax
 
 pytestmark = pytest.mark.xdist_group("paper_cell")  # what its fixtures make serves one worker
 
-MOST_ITERATIONS = 80
+MOST_ITERATIONS, MOST_GRADIENTS = 80, 200
 """What a relaxation of this cell, and any step of 2.5 %, may take in iterations of Newton's method, one by gradients
-being an eighth of those (`CHEAP`)."""
+being an eighth of those (`CHEAP`); and what such a step may take by gradients."""
 SYMMETRY = 1e-5
 """Relative difference allowed between warp and weft forces, which a symmetry of the cell makes equal: the free
 residual of 1e-6 N on either side of a force of about 1 N, and its amplification by the softest mode."""
@@ -61,6 +61,7 @@ def test_equilibrium_is_found_in_time(cell: Cell) -> None:
         assert state.residual <= 1e-6
         newton = len(state.history) - 1
         assert newton + (state.iterations - newton) / CHEAP <= MOST_ITERATIONS
+    assert cell.stretched.iterations <= MOST_GRADIENTS
 
 
 def test_forces_are_equal_in_both_directions_by_symmetry(cell: Cell) -> None:
